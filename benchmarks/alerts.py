@@ -11,10 +11,10 @@ import time
 import numpy as np
 
 import collision_monitor as cm
-from collision_monitor.alerts.closest_approach import closest_approach
-from collision_monitor.alerts.nearest import nearest
+from collision_monitor.alerts.closest_approach import closest_approaches
+from collision_monitor.alerts.nearest import nearest_points_at
 from collision_monitor.alerts.rules import Rules
-from collision_monitor.alerts.scene import Scene
+from collision_monitor.alerts.scene import MonitoredBodies
 from collision_monitor.codec import encode_descriptions, encode_states
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
@@ -78,16 +78,16 @@ def errors(pairs: int = 2000) -> None:
     poses[:, 3:] /= np.linalg.norm(poses[:, 3:], axis=1)[:, None]
     twists = np.hstack([generator.normal(0, 2, (100, 3)), generator.normal(0, 1, (100, 3))])
     monitor.step(0, np.arange(100), poses, twists)
-    scene = Scene(monitor.roster, monitor.profile, monitor.now)
+    scene = MonitoredBodies(monitor.roster, monitor.profile, monitor.now)
     i, j = generator.integers(0, 50, pairs).astype(np.int32), generator.integers(50, 100, pairs).astype(np.int32)
     begin = time.perf_counter()
-    _, least = closest_approach(scene, i, j, 2.0)
+    _, least = closest_approaches(scene, i, j, 2.0)
     each = (time.perf_counter() - begin) / pairs
     times = np.linspace(0.0, 2.0, 2001)
     worst = []
     for k in range(pairs):
         many = np.full(len(times), i[k]), np.full(len(times), j[k])
-        found = nearest(scene, *many, scene.now + times, np.full(len(times), np.inf), widen=False)
+        found = nearest_points_at(scene, *many, scene.now + times, np.full(len(times), np.inf), widen=False)
         relative = np.sqrt(((scene.velocity[j[k]] - scene.velocity[i[k]]) ** 2).sum())
         path = 2.0 * (relative + scene.turning[i[k]] + scene.turning[j[k]])
         worst.append((found.distance.min() - least[k]) / path if found.distance.min() > 0.0 else 0.0)

@@ -22,7 +22,7 @@ from collision_monitor.geometry.bounding_spheres import (
     sphere_from_widest_pair,
     sphere_grown,
 )
-from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS, Kdop, aabb, convex_hull, kdop
+from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS, Kdop, aabb, convex_hull, kdop_of_points
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume, obb_pca
 
 Array = NDArray[np.float64]
@@ -93,10 +93,10 @@ def main() -> None:
         volume[name] = [build(points) for points in sets.values()]
         cost[name] = [milliseconds(lambda b=build, p=points: b(p)) for points in sets.values()]  # type: ignore[misc]
     for k in KDOP_DIRECTIONS:
-        slabs = [kdop(points, k) for points in sets.values()]
+        slabs = [kdop_of_points(points, k) for points in sets.values()]
         middles = [points.mean(axis=0) for points in sets.values()]
         volume[f"{k}-DOP"] = [kdop_volume(s, middle) for s, middle in zip(slabs, middles, strict=True)]
-        cost[f"{k}-DOP"] = [milliseconds(lambda p=points, k=k: kdop(p, k)) for points in sets.values()]  # type: ignore[misc]
+        cost[f"{k}-DOP"] = [milliseconds(lambda p=points, k=k: kdop_of_points(p, k)) for points in sets.values()]  # type: ignore[misc]
     hull = volume["convex hull"]
     order = [name for name in BUILDS if name != "convex hull"] + [f"{k}-DOP" for k in KDOP_DIRECTIONS] + ["convex hull"]
     for title, table, digits in (

@@ -22,7 +22,7 @@ from scipy.spatial import cKDTree
 
 from collision_monitor.response.two_bodies import collide
 from collision_monitor.world.hard_spheres.simulation import HardSpheres, carnahan_starling
-from collision_monitor.world.hard_spheres.starting_points import overlapping
+from collision_monitor.world.hard_spheres.starting_points import overlapping_spheres
 from collision_monitor.world.hard_spheres.time_step import step_spheres
 from collision_monitor.world.rigid.collision_response import bounce_between_walls
 
@@ -86,7 +86,7 @@ def pressures(collisions: int) -> list[tuple[float, float, float]]:
 def overlap_step(at: Array, moving: Array, radii: Array, masses: Array, side: float, dt: float) -> tuple[Array, Array]:
     """Fly for `dt`, then let the pairs that overlap at the end collide: what the lecture's first loop does."""
     at, moving = bounce_between_walls(at, moving, radii[:, None], side - radii[:, None], dt)
-    for a, b in overlapping(at, radii, None).tolist():
+    for a, b in overlapping_spheres(at, radii, None).tolist():
         moving[a], moving[b] = collide(moving[a], moving[b], at[b] - at[a], masses[a], masses[b])
     return at, moving
 

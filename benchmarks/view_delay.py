@@ -27,7 +27,7 @@ from collision_monitor import records  # noqa: E402
 from collision_monitor.codec import encode_contacts, encode_descriptions, encode_predictions, encode_states  # noqa: E402
 from collision_monitor.objects.description import ObjectDescription  # noqa: E402
 from collision_monitor.shapes.shapes import Box, Capsule, Sphere  # noqa: E402
-from collision_monitor.view.scene import Scene  # noqa: E402
+from collision_monitor.view.scene import TopicContent  # noqa: E402
 from collision_monitor.view.server import start_server, stop_server  # noqa: E402
 from collision_monitor.view.view import View  # noqa: E402
 from collision_monitor.world.scene import state_array  # noqa: E402
@@ -47,7 +47,7 @@ def main() -> None:
     server = start_server(port=0)
     view = View(server)
     view.panel.add_rest()
-    scene = Scene()
+    scene = TopicContent()
     shapes = (Sphere(0.3), Box((0.6, 0.4, 0.5)), Capsule(0.2, 0.6))
     objects = [ObjectDescription(k, shapes[k % 3]) for k in range(args.objects)]
     scene.take("ObjectDescriptionArray", encode_descriptions(1, "world", objects, snapshot=True))
@@ -74,7 +74,7 @@ def main() -> None:
     _report(seen, published, costs, args.seconds)
 
 
-def _feed(view: View, scene: Scene, args: argparse.Namespace) -> tuple[list[float], list[float]]:
+def _feed(view: View, scene: TopicContent, args: argparse.Namespace) -> tuple[list[float], list[float]]:
     """Take steps at the rate and show each. Return when each was published (s), and what its picture cost (s)."""
     while not view.is_watched:
         time.sleep(0.05)

@@ -25,7 +25,7 @@ from collision_monitor.geometry.bounding_spheres import (
     sphere_from_centroid,
     sphere_from_widest_pair,
 )
-from collision_monitor.geometry.bounding_volumes import aabb, convex_hull, kdop
+from collision_monitor.geometry.bounding_volumes import aabb, convex_hull, kdop_of_points
 from collision_monitor.geometry.lecture.polygon_overlap import project, sat_2d
 from collision_monitor.geometry.lecture.sphere_tree import distance_intervals, sphere_tree
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume, obb_pca
@@ -59,7 +59,7 @@ def bounding_volumes() -> None:
     floors = np.vstack([np.column_stack([points, np.full(len(points), z)]) for z in (0.0, 1.0)])
     hull = around(np.unique(convex_hull(floors).vertices[:, :2], axis=0))
     box = aabb(points)
-    slabs = kdop(floors, [[1, 0, 0], [0, 1, 0], [1, 1, 0], [1, -1, 0]])
+    slabs = kdop_of_points(floors, [[1, 0, 0], [0, 1, 0], [1, 1, 0], [1, -1, 0]])
     flat = slabs.directions[:, :2]
     planes = np.vstack([np.column_stack([flat, -slabs.upper]), np.column_stack([-flat, slabs.lower])])
     corners = HalfspaceIntersection(planes, points.mean(axis=0)).intersections

@@ -76,7 +76,7 @@ class Lanes:
         return Lanes(self.builder, self.builder.select(less, self.value, other.value))
 
 
-def load(context: Any, builder: Any, array_type: Any, array: Any, at: Any, offset: int = 0) -> Lanes:
+def load_lanes(context: Any, builder: Any, array_type: Any, array: Any, at: Any, offset: int = 0) -> Lanes:
     """LANES numbers of the data of a contiguous array of float64, from the element `at` + offset on."""
     return Lanes(builder, builder.load(_pointer(context, builder, array_type, array, at, offset), align=8))
 

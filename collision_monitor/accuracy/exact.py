@@ -29,34 +29,34 @@ def exactly(function: Any) -> Any:
     return run
 
 
-def vector(values: Iterable[float]) -> Vector:
+def exact_vector(values: Iterable[float]) -> Vector:
     """Convert floats to decimals without rounding."""
     return [Decimal(float(x)) for x in values]
 
 
-def dot(a: Vector, b: Vector) -> Decimal:
+def exact_dot(a: Vector, b: Vector) -> Decimal:
     """Return a . b."""
     return sum((x * y for x, y in zip(a, b, strict=True)), Decimal(0))
 
 
-def minus(a: Vector, b: Vector) -> Vector:
+def exact_minus(a: Vector, b: Vector) -> Vector:
     """Return a - b."""
     return [x - y for x, y in zip(a, b, strict=True)]
 
 
-def cross(a: Vector, b: Vector) -> Vector:
+def exact_cross(a: Vector, b: Vector) -> Vector:
     """Return a x b."""
     return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 
 
 def length(a: Vector) -> Decimal:
     """Return |a|."""
-    return dot(a, a).sqrt()
+    return exact_dot(a, a).sqrt()
 
 
 def axes(quaternion: Sequence[float]) -> Matrix:
     """Columns of the rotation matrix of a quaternion (x, y, z, w) of any length."""
-    x, y, z, w = vector(quaternion)
+    x, y, z, w = exact_vector(quaternion)
     s = 2 / (x * x + y * y + z * z + w * w)
     return [
         [1 - s * (y * y + z * z), s * (x * y + w * z), s * (x * z - w * y)],
@@ -66,9 +66,9 @@ def axes(quaternion: Sequence[float]) -> Matrix:
 
 
 @exactly
-def sphere_sphere(p: Sequence[float], q: Sequence[float], r: float, s: float) -> Decimal:
+def exact_sphere_sphere(p: Sequence[float], q: Sequence[float], r: float, s: float) -> Decimal:
     """Signed distance of two spheres at p and q with radii r and s."""
-    return length(minus(vector(q), vector(p))) - Decimal(r) - Decimal(s)
+    return length(exact_minus(exact_vector(q), exact_vector(p))) - Decimal(r) - Decimal(s)
 
 
 @exactly
@@ -76,8 +76,8 @@ def sphere_box(
     p: Sequence[float], r: float, q: Sequence[float], turn: Sequence[float], size: Sequence[float]
 ) -> Decimal:
     """Signed distance of a sphere at p and a box at q. With the centre inside, the depth is to the nearest face."""
-    offset = minus(vector(p), vector(q))
-    local = [dot(offset, axis) for axis in axes(turn)]
+    offset = exact_minus(exact_vector(p), exact_vector(q))
+    local = [exact_dot(offset, axis) for axis in axes(turn)]
     out = [abs(x) - Decimal(s) / 2 for x, s in zip(local, size, strict=True)]
     if max(out) <= 0:
         return max(out) - Decimal(r)
@@ -91,7 +91,7 @@ def capsule_capsule(
 ) -> Decimal:  # fmt: skip
     """Signed distance of capsules at p and q with quaternions u and v, radii r and s, cores of core_a and core_b."""
     a, b = axes(u)[2], axes(v)[2]
-    offset = minus(vector(q), vector(p))
+    offset = exact_minus(exact_vector(q), exact_vector(p))
     half_a, half_b = Decimal(core_a) / 2, Decimal(core_b) / 2
 
     def apart(x: Decimal, y: Decimal) -> Decimal:
@@ -102,13 +102,13 @@ def capsule_capsule(
 
     best = []
     for end in (-half_a, half_a):
-        best.append(apart(end, within(end * dot(a, b) - dot(offset, b), half_b)))
+        best.append(apart(end, within(end * exact_dot(a, b) - exact_dot(offset, b), half_b)))
     for end in (-half_b, half_b):
-        best.append(apart(within(end * dot(a, b) + dot(offset, a), half_a), end))
-    determinant = 1 - dot(a, b) ** 2
+        best.append(apart(within(end * exact_dot(a, b) + exact_dot(offset, a), half_a), end))
+    determinant = 1 - exact_dot(a, b) ** 2
     if determinant > 0:
-        x = (dot(offset, a) - dot(a, b) * dot(offset, b)) / determinant
-        y = x * dot(a, b) - dot(offset, b)
+        x = (exact_dot(offset, a) - exact_dot(a, b) * exact_dot(offset, b)) / determinant
+        y = x * exact_dot(a, b) - exact_dot(offset, b)
         if abs(x) <= half_a and abs(y) <= half_b:
             best.append(apart(x, y))
     return min(best) - Decimal(r) - Decimal(s)
@@ -122,15 +122,15 @@ def box_box_depth(
     """Signed distance (negative) of overlapping boxes by the SAT with all fifteen axes. None if they do not overlap."""
     A, B = axes(u), axes(v)
     half_a, half_b = ([Decimal(float(s)) / 2 for s in size] for size in (size_a, size_b))
-    offset = minus(vector(q), vector(p))
-    candidates = [*A, *B, *(cross(a, b) for a, b in product(A, B))]
+    offset = exact_minus(exact_vector(q), exact_vector(p))
+    candidates = [*A, *B, *(exact_cross(a, b) for a, b in product(A, B))]
     worst: Decimal | None = None
     for axis in candidates:
-        squared = dot(axis, axis)
+        squared = exact_dot(axis, axis)
         if squared <= Decimal(10) ** (5 - DIGITS):
             continue
-        reach = sum((h * abs(dot(axis, e)) for h, e in zip(half_a + half_b, A + B, strict=True)), Decimal(0))
-        gap = (abs(dot(offset, axis)) - reach) / squared.sqrt()
+        reach = sum((h * abs(exact_dot(axis, e)) for h, e in zip(half_a + half_b, A + B, strict=True)), Decimal(0))
+        gap = (abs(exact_dot(offset, axis)) - reach) / squared.sqrt()
         worst = gap if worst is None else max(worst, gap)
     return worst if worst is not None and worst <= 0 else None
 
@@ -138,8 +138,8 @@ def box_box_depth(
 @exactly
 def spheres_meet(p: Sequence[float], v: Sequence[float], reach: Sequence[float]) -> Decimal | None:
     """Return the first time t >= 0 at which |p + v t| is at most the sum of `reach`, or None."""
-    P, V, R = vector(p), vector(v), sum(vector(reach), Decimal(0))
-    a, b, c = dot(V, V), dot(P, V), dot(P, P) - R * R
+    P, V, R = exact_vector(p), exact_vector(v), sum(exact_vector(reach), Decimal(0))
+    a, b, c = exact_dot(V, V), exact_dot(P, V), exact_dot(P, P) - R * R
     if c <= 0:
         return Decimal(0)
     discriminant = b * b - a * c
@@ -154,7 +154,7 @@ def aligned_boxes_meet(
 ) -> Decimal | None:
     """Return the first time at which axis-aligned boxes touch, or None. The second box is at p with velocity v."""
     enter, leave = Decimal(0), Decimal("Infinity")
-    for x, w, a, b in zip(vector(p), vector(v), vector(size_a), vector(size_b), strict=True):
+    for x, w, a, b in zip(exact_vector(p), exact_vector(v), exact_vector(size_a), exact_vector(size_b), strict=True):
         reach = (a + b) / 2
         if w == 0:
             if abs(x) > reach:

@@ -89,7 +89,7 @@ def samples_of(case: Configuration, rng: Rng) -> Iterator[Sample]:
     r, s = size * rng.uniform(0.3, 0.5), other * rng.uniform(0.3, 0.5)
     scale = size + other
     a, b = Pose(at), Pose(at + (r + s + gap) * away)
-    truth = exact.sphere_sphere(a.position, b.position, r, s)
+    truth = exact.exact_sphere_sphere(a.position, b.position, r, s)
     yield _compared("sphere–sphere", contact(Sphere(r), a, Sphere(s), b), truth, scale)
 
     box = other * rng.uniform(0.5, 1.0, 3)

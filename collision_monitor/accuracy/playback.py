@@ -49,7 +49,7 @@ class Played:
         }
 
 
-def play(
+def play_steps(
     monitor: Monitor,
     described: Iterable[ObjectDescription],
     steps: Sequence[Step],

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.alerts.answered import answered
-from collision_monitor.alerts.debounce import ENTRY, Conditions, Delays, Entries, advance, lasting, restart
-from collision_monitor.alerts.evaluation import evaluate
+from collision_monitor.alerts.debounce import ENTRY, Conditions, Delays, Entries, advance_entries, lasting, restart
+from collision_monitor.alerts.evaluation import evaluate_rule
 from collision_monitor.alerts.measures import Measures, Slots
-from collision_monitor.alerts.messages import Change, Head, NameOf, measured, message
+from collision_monitor.alerts.messages import AlertChange, Head, NameOf, measured, message
 from collision_monitor.alerts.rules import Rule, Rules
-from collision_monitor.alerts.scene import Scene
+from collision_monitor.alerts.scene import MonitoredBodies
 from collision_monitor.alerts.selection import Classes
 from collision_monitor.codec.alerts import AlertCause, CollisionAlert, CollisionAlertArray
 from collision_monitor.impact.impact_record import ids_of_keys
@@ -80,7 +80,7 @@ class Alerts:
         """Return the alerts that a step changes, by rule and pair. Without rules this costs nothing."""
         if not (self.rules.rules or self._gone):
             return []
-        scene = Scene(monitor.roster, monitor.profile, monitor.now)
+        scene = MonitoredBodies(monitor.roster, monitor.profile, monitor.now)
         if self._is_outdated:
             self._classes.update(monitor.roster)
             self._is_outdated = False
@@ -103,7 +103,9 @@ class Alerts:
                 restart(entries, now)
         self._last = [now, restarts]
 
-    def _advance(self, rule: Rule, scene: Scene, answers: Measures, now: int) -> tuple[Measures, list[Change]]:
+    def _advance(
+        self, rule: Rule, scene: MonitoredBodies, answers: Measures, now: int
+    ) -> tuple[Measures, list[AlertChange]]:
         """Advance one rule. Return its measures and its changes, by pair."""
         entries = self._entries[rule.name]
         i, j = (scene.roster.find_slots(ids.astype(np.uint32)) for ids in ids_of_keys(entries["key"]))
@@ -111,21 +113,21 @@ class Alerts:
         removed, entries = entries.compress(is_removed), entries.compress(~is_removed)
         is_unknown = _is_stale(scene, i[~is_removed]) | _is_stale(scene, j[~is_removed])
         raised = entries["key"][entries["level"] > 0]
-        found, level = evaluate(self.rules, rule, self._classes, scene, answers, raised)
+        found, level = evaluate_rule(self.rules, rule, self._classes, scene, answers, raised)
         uncertain = np.union1d(entries["key"][is_unknown], found.keys[found.uncertain])
         conditions = Conditions(found.keys, level, uncertain)
-        after, before = advance(entries, conditions, now, Delays(rule.raise_after, rule.clear_after))
+        after, before = advance_entries(entries, conditions, now, Delays(rule.raise_after, rule.clear_after))
         self._entries[rule.name] = lasting(after)
         changes = _ended(removed)
         for k in np.flatnonzero(after["level"] != before).tolist():
             key, new, since = int(after["key"][k]), int(after["level"][k]), int(after["since"][k])
             cause = AlertCause.UNRESOLVED if np.isin(after["key"][k], uncertain) else AlertCause.CONDITIONS
             classes = self._classes.of_pair(rule.between, scene.roster, key)
-            changes.append(Change(key, new, int(before[k]), since, cause, classes))
+            changes.append(AlertChange(key, new, int(before[k]), since, cause, classes))
         return found, sorted(changes)
 
     def _messages(
-        self, head: Head, rule: str, of: tuple[Rule, Measures] | None, changes: list[Change]
+        self, head: Head, rule: str, of: tuple[Rule, Measures] | None, changes: list[AlertChange]
     ) -> list[CollisionAlert]:
         made = []
         for change in changes:
@@ -168,11 +170,11 @@ def _none() -> Entries:
     return np.zeros(0, ENTRY)
 
 
-def _ended(entries: Entries) -> list[Change]:
+def _ended(entries: Entries) -> list[AlertChange]:
     """Return the end of each raised alert among the entries."""
     raised = entries.compress(entries["level"] > 0)
-    return [Change(int(e["key"]), 0, int(e["level"]), int(e["since"]), AlertCause.REMOVED) for e in raised]
+    return [AlertChange(int(e["key"]), 0, int(e["level"]), int(e["since"]), AlertCause.REMOVED) for e in raised]
 
 
-def _is_stale(scene: Scene, slots: Slots) -> NDArray[np.bool_]:
+def _is_stale(scene: MonitoredBodies, slots: Slots) -> NDArray[np.bool_]:
     return np.asarray(scene.stale[slots])

@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.alerts.measures import Measures
-from collision_monitor.alerts.scene import Scene
+from collision_monitor.alerts.scene import MonitoredBodies
 from collision_monitor.impact.impact_record import pair_keys
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.records import ContactStatus, PredictionStatus
 
 
-def answered(scene: Scene, result: StepResult) -> Measures:
+def answered(scene: MonitoredBodies, result: StepResult) -> Measures:
     """Return the measures of all pairs in the answers of a step.
 
     A contact has the time 0 and the probability 1. A pair that passes as stated (POSSIBLE) has an infinite time. The

@@ -15,7 +15,7 @@ import numpy as np
 
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.alerts.measures import Array, Slots
-from collision_monitor.alerts.scene import Scene
+from collision_monitor.alerts.scene import MonitoredBodies
 from collision_monitor.impact.body_contact import RESULT, ContactQuery, body_contact
 from collision_monitor.impact.body_impact import make_scratch
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL
@@ -36,7 +36,7 @@ TIME, LEAST, SLOPE = range(3)
 _SCRATCH: Any = make_scratch()
 
 
-def sphere_approach(scene: Scene, i: Slots, j: Slots, horizon: float) -> Array:
+def sphere_approach(scene: MonitoredBodies, i: Slots, j: Slots, horizon: float) -> Array:
     """Return a lower bound (n,) of the distance (m) within the horizon (s), by the bounding spheres."""
     p = scene.position[j] - scene.position[i]
     v = scene.velocity[j] - scene.velocity[i]
@@ -49,7 +49,9 @@ def sphere_approach(scene: Scene, i: Slots, j: Slots, horizon: float) -> Array:
     return np.asarray(np.sqrt(((p + t[:, None] * v) ** 2).sum(axis=1)) - reach)
 
 
-def closest_approach(scene: Scene, i: Slots, j: Slots, horizon: float, enough: float = inf) -> tuple[Array, Array]:
+def closest_approaches(
+    scene: MonitoredBodies, i: Slots, j: Slots, horizon: float, enough: float = inf
+) -> tuple[Array, Array]:
     """Return TCPA (s from now) and DCPA (m, the smallest that its error allows) within the horizon (s), each (n,).
 
     enough: m; a pair that is found to stay farther apart is not searched any further, and its DCPA is a lower bound.

@@ -44,7 +44,9 @@ class Delays(NamedTuple):
     clear_after: int
 
 
-def advance(entries: Entries, conditions: Conditions, now: int, delays: Delays) -> tuple[Entries, NDArray[np.uint8]]:
+def advance_entries(
+    entries: Entries, conditions: Conditions, now: int, delays: Delays
+) -> tuple[Entries, NDArray[np.uint8]]:
     """Return the entries after a step at `now` (ns), and the level of each before it (n,).
 
     An uncertain pair rises as any other one, and does not fall. Entries at level 0 remain as long as a condition lasts,

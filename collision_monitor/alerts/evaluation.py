@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.alerts.answered import is_touching
-from collision_monitor.alerts.closest_approach import closest_approach, sphere_approach
+from collision_monitor.alerts.closest_approach import closest_approaches, sphere_approach
 from collision_monitor.alerts.measures import Array, Measures, Slots
-from collision_monitor.alerts.nearest import nearest
+from collision_monitor.alerts.nearest import nearest_points_at
 from collision_monitor.alerts.rules import Rule, Rules
-from collision_monitor.alerts.scene import Scene
+from collision_monitor.alerts.scene import MonitoredBodies
 from collision_monitor.alerts.selection import Classes, select
 from collision_monitor.alerts.thresholds import APPROACH
 from collision_monitor.alerts.traffic import post_encroachment_time, required_deceleration, time_headway
@@ -30,8 +30,8 @@ REACH: Final = 1.0 + 1e-9
 """Factor on distances that decide which pairs are measured, so that rounding loses none."""
 
 
-def evaluate(
-    rules: Rules, rule: Rule, classes: Classes, scene: Scene, answers: Measures, raised: NDArray[np.uint64]
+def evaluate_rule(
+    rules: Rules, rule: Rule, classes: Classes, scene: MonitoredBodies, answers: Measures, raised: NDArray[np.uint64]
 ) -> tuple[Measures, NDArray[np.uint8]]:
     """Return the measures of the rule's pairs, and the level (n,) whose thresholds each of them passes; 0: none.
 
@@ -49,7 +49,7 @@ def evaluate(
     return found, level
 
 
-def _is_quiet(rule: Rule, scene: Scene, found: Measures) -> NDArray[np.bool_]:
+def _is_quiet(rule: Rule, scene: MonitoredBodies, found: Measures) -> NDArray[np.bool_]:
     """Return which pairs rest or part, so far as the rule leaves these out. What is uncertain is not quiet."""
     quiet = np.zeros(len(found), np.bool_)
     if rule.quiet_at_rest:
@@ -60,7 +60,7 @@ def _is_quiet(rule: Rule, scene: Scene, found: Measures) -> NDArray[np.bool_]:
 
 
 def _with_near(
-    rules: Rules, rule: Rule, classes: Classes, scene: Scene, found: Measures, raised: NDArray[np.uint64]
+    rules: Rules, rule: Rule, classes: Classes, scene: MonitoredBodies, found: Measures, raised: NDArray[np.uint64]
 ) -> Measures:
     """Return the measures with the pairs added that are near enough to pass a threshold, and the raised ones."""
     i, j = _near(rule, classes, scene)
@@ -74,7 +74,7 @@ def _with_near(
     return both
 
 
-def _near(rule: Rule, classes: Classes, scene: Scene) -> tuple[Slots, Slots]:
+def _near(rule: Rule, classes: Classes, scene: MonitoredBodies) -> tuple[Slots, Slots]:
     """Return the pairs of bodies whose spheres, grown by their reaches, meet and that the monitor checks."""
     first, second = map(classes.of, rule.between)
     which = np.flatnonzero(scene.present & (first | second))
@@ -86,7 +86,7 @@ def _near(rule: Rule, classes: Classes, scene: Scene) -> tuple[Slots, Slots]:
     return pairs[:, 0], pairs[:, 1]
 
 
-def _reach(rule: Rule, scene: Scene, slots: NDArray[np.intp]) -> Array:
+def _reach(rule: Rule, scene: MonitoredBodies, slots: NDArray[np.intp]) -> Array:
     """Return for each body (n,) the distance (m) that it adds to the largest at which its pairs pass a threshold."""
     speed, horizon = scene.speed[slots], scene.profile.horizon
     reach = np.zeros(len(slots))
@@ -113,11 +113,11 @@ def _reach(rule: Rule, scene: Scene, slots: NDArray[np.intp]) -> Array:
     return reach
 
 
-def _measure(rule: Rule, classes: Classes, scene: Scene, found: Measures) -> None:
+def _measure(rule: Rule, classes: Classes, scene: MonitoredBodies, found: Measures) -> None:
     """Measure the pairs from the states."""
     i, j, wanted = found.i, found.j, rule.measures
     limits = np.full(len(i), np.inf)
-    near = nearest(scene, i, j, np.full(len(i), scene.now), limits, widen=True)
+    near = nearest_points_at(scene, i, j, np.full(len(i), scene.now), limits, widen=True)
     distance = near.distance - near.error
     found["distance"], found["distance_error"] = distance, 2.0 * near.error
     found["closing_speed"], found.points = near.closing, near.points
@@ -137,11 +137,11 @@ def _measure(rule: Rule, classes: Classes, scene: Scene, found: Measures) -> Non
         _approach(rule, scene, found)
 
 
-def _approach(rule: Rule, scene: Scene, found: Measures) -> None:
+def _approach(rule: Rule, scene: MonitoredBodies, found: Measures) -> None:
     """Measure the closest approach of the pairs whose bounding spheres come near enough."""
     horizon = scene.profile.horizon
     largest = max(level.values.get(APPROACH[0], 0.0) for level in rule.levels)
     bound = sphere_approach(scene, found.i, found.j, horizon)
     which = np.flatnonzero(bound <= largest * REACH)
-    time, distance = closest_approach(scene, found.i[which], found.j[which], horizon, largest)
+    time, distance = closest_approaches(scene, found.i[which], found.j[which], horizon, largest)
     found["distance_at_closest_approach"][which], found["time_to_closest_approach"][which] = distance, time

@@ -19,7 +19,7 @@ NameOf = Callable[[int], str]
 _UNKNOWN: Final = (np.nan, np.nan, np.nan)
 
 
-class Change(NamedTuple):
+class AlertChange(NamedTuple):
     """The change of one alert: the pair's key, its levels, the stamp at which it rose from 0 (ns), and why.
 
     classes: by which the rule selects the pair; empty after the end of an object or of the rule.
@@ -42,7 +42,9 @@ class Head(NamedTuple):
     name_of: NameOf
 
 
-def message(head: Head, number: int, rule: str, change: Change, of: tuple[Rule, Measures] | None) -> CollisionAlert:
+def message(
+    head: Head, number: int, rule: str, change: AlertChange, of: tuple[Rule, Measures] | None
+) -> CollisionAlert:
     """Return the message of a change. of: the rule and its measures of the step; None: the rule is there no more."""
     id_a, id_b = change.key >> 32, change.key & 0xFFFFFFFF
     names = head.name_of(id_a), head.name_of(id_b)
@@ -90,7 +92,7 @@ def _find(measures: Measures, key: int) -> int:
     return at if at < len(measures) and measures.keys[at] == key else -1
 
 
-def _reason(head: Head, change: Change, of: tuple[Rule, Measures] | None, at: int) -> str:
+def _reason(head: Head, change: AlertChange, of: tuple[Rule, Measures] | None, at: int) -> str:
     lasted = f"after {(head.stamp_ns - change.since_ns) * NANOSECOND:.2f} s"
     if change.cause is AlertCause.REMOVED:
         return f"ended {lasted}, because {'the rule' if of is None else 'an object'} was removed"

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import kernel
 from collision_monitor.alerts.measures import Array, Slots
-from collision_monitor.alerts.scene import Scene
+from collision_monitor.alerts.scene import MonitoredBodies
 from collision_monitor.impact.body_contact import RESULT, ContactQuery, body_contact
 from collision_monitor.impact.body_impact import CLOSING, make_scratch
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B
@@ -34,7 +34,9 @@ class Nearest(NamedTuple):
 _SCRATCH: Any = make_scratch()
 
 
-def nearest(scene: Scene, i: Slots, j: Slots, times: Array, limits: Array, *, widen: bool) -> Nearest:
+def nearest_points_at(
+    scene: MonitoredBodies, i: Slots, j: Slots, times: Array, limits: Array, *, widen: bool
+) -> Nearest:
     """Return the nearest points of the pairs (i, j) (n,) at `times` (n,) s, up to the limits (n,) m.
 
     widen: whether the error includes what stale bodies may have done since their last states.

@@ -11,7 +11,7 @@ from collision_monitor.monitor.state.roster import Roster
 from collision_monitor.settings.profile import Profile
 
 
-class Scene:
+class MonitoredBodies:
     """The bodies at `now` (s after the monitor's origin), in the world frame; N slots.
 
     present (N,): the body is described and has a state, and lies in the region of interest. position, velocity, angular

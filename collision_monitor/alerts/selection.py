@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.alerts.measures import Array, Measures, Slots
 from collision_monitor.alerts.rules import ANY, Rule, Rules
-from collision_monitor.alerts.scene import Scene
+from collision_monitor.alerts.scene import MonitoredBodies
 from collision_monitor.monitor.state.roster import Roster
 
 Mask = NDArray[np.bool_]
@@ -60,7 +60,7 @@ class Classes:
         return between if here[0] else (between[1], between[0])
 
 
-def select(rules: Rules, rule: Rule, classes: Classes, scene: Scene, measures: Measures) -> Mask:
+def select(rules: Rules, rule: Rule, classes: Classes, scene: MonitoredBodies, measures: Measures) -> Mask:
     """Return which of the pairs (n,) the rule is about."""
     i, j = measures.i, measures.j
     known = (i >= 0) & (j >= 0)
@@ -82,15 +82,15 @@ def select(rules: Rules, rule: Rule, classes: Classes, scene: Scene, measures: M
     return chosen
 
 
-def _may_be_in(rules: Rules, zone: str, scene: Scene, slots: Slots) -> Mask:
+def _may_be_in(rules: Rules, zone: str, scene: MonitoredBodies, slots: Slots) -> Mask:
     """Return whether any part of these bodies may be in the zone."""
     return np.asarray(_distance(rules, zone, scene, slots) <= scene.radius[slots] + scene.doubt[slots])
 
 
-def _is_in(rules: Rules, zone: str, scene: Scene, slots: Slots) -> Mask:
+def _is_in(rules: Rules, zone: str, scene: MonitoredBodies, slots: Slots) -> Mask:
     """Return whether these bodies are wholly in the zone."""
     return np.asarray(_distance(rules, zone, scene, slots) <= -(scene.radius[slots] + scene.doubt[slots]))
 
 
-def _distance(rules: Rules, zone: str, scene: Scene, slots: Slots) -> Array:
+def _distance(rules: Rules, zone: str, scene: MonitoredBodies, slots: Slots) -> Array:
     return rules.zones[zone].distance(scene.position[slots])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from collision_monitor.alerts.measures import Array, Slots
-from collision_monitor.alerts.scene import Scene
+from collision_monitor.alerts.scene import MonitoredBodies
 
 
 def required_deceleration(distance: Array, closing: Array) -> Array:
@@ -29,7 +29,7 @@ def time_headway(distance: Array, toward_a: Array, toward_b: Array) -> Array:
         return np.asarray(np.where(speed > 0.0, np.maximum(distance, 0.0) / speed, np.inf))
 
 
-def post_encroachment_time(scene: Scene, i: Slots, j: Slots, horizon: float) -> Array:
+def post_encroachment_time(scene: MonitoredBodies, i: Slots, j: Slots, horizon: float) -> Array:
     """Return the time (s) between one leaving the place where the paths cross and the other's arrival (n,).
 
     The paths are straight lines along the present velocities, and the bodies count as their bounding spheres, so the

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from collision_monitor.broad_phase.boxes import Array, Indices, box_arrays, in_order, overlaps, ranges
+from collision_monitor.broad_phase.boxes import Array, Indices, box_arrays, concatenated_ranges, in_order, overlaps
 
 
 class AabbTree(NamedTuple):
@@ -58,8 +58,8 @@ def tree_overlaps(lower: ArrayLike, upper: ArrayLike) -> Indices:
         j = np.concatenate([2 * j, 2 * j + 1, 2 * j[~same], 2 * j + 1])
         i, j = overlaps(node_low, node_high, i, j).T
     size = np.diff(tree.first)
-    b, owner = ranges(tree.first[j], size[j])
-    a, again = ranges(tree.first[i[owner]], size[i[owner]])
+    b, owner = concatenated_ranges(tree.first[j], size[j])
+    a, again = concatenated_ranges(tree.first[i[owner]], size[i[owner]])
     b = b[again]
     pairs = tree.order[np.stack([a, b], axis=1)[(a < b) | (i != j)[owner[again]]]]
     return in_order(overlaps(low, high, *pairs.T))

@@ -26,7 +26,7 @@ def box_arrays(lower: ArrayLike, upper: ArrayLike) -> tuple[Array, Array]:
     return low, high
 
 
-def ranges(first: Indices, count: Indices) -> tuple[Indices, Indices]:
+def concatenated_ranges(first: Indices, count: Indices) -> tuple[Indices, Indices]:
     """Concatenate the ranges first[k] … first[k] + count[k] - 1 over all k; return the numbers and the k of each."""
     owner = np.repeat(np.arange(len(count)), count)
     return np.arange(len(owner)) + np.repeat(first - (np.cumsum(count) - count), count), owner
@@ -40,7 +40,7 @@ def overlaps_in_ranges(low: Array, high: Array, box: Indices, first: Indices, co
     while begin < len(box):
         most = (done[begin - 1] if begin else 0) + CANDIDATES_AT_ONCE
         end = max(int(np.searchsorted(done, most, side="right")), begin + 1)
-        j, owner = ranges(first[begin:end], count[begin:end])
+        j, owner = concatenated_ranges(first[begin:end], count[begin:end])
         found.append(overlaps(low, high, box[begin:end][owner], j))
         begin = end
     return np.concatenate(found)

@@ -67,7 +67,7 @@ def note_changed(boxes: Any, box: Any, which: Any) -> None:
 
 
 @inlined
-def overlapping(boxes: Any, region: Any, found: Any) -> Any:
+def overlapping_boxes(boxes: Any, region: Any, found: Any) -> Any:
     """Write the numbers of all boxes that overlap the Region into found (N + 1,); return how many there are.
 
     Boxes that were removed are among them.

@@ -20,7 +20,7 @@ from collision_monitor.ros.domain import free_domain
 from collision_monitor.ros.process import StopRequest, ros_context, stay_on_this_machine
 
 if TYPE_CHECKING:
-    from collision_monitor.cli.output.live_table import Picture
+    from collision_monitor.cli.output.live_table import LatestAnswers
     from collision_monitor.ros.listening.viewer import Viewer
 
 START_PATIENCE = 180.0
@@ -163,7 +163,7 @@ def _wait_for_answer(viewer: Viewer, monitor: Child, stop: StopRequest) -> None:
             raise ProcessError(f"collision-monitor run: expected a status within {START_PATIENCE:g} s, got none")
 
 
-def _show(viewer: Viewer, scene: str, children: list[Child], stop: StopRequest) -> Picture:
+def _show(viewer: Viewer, scene: str, children: list[Child], stop: StopRequest) -> LatestAnswers:
     """Draw until the scene ends and return the last picture."""
     from rich.console import Console
     from rich.live import Live
@@ -190,11 +190,11 @@ def _show(viewer: Viewer, scene: str, children: list[Child], stop: StopRequest) 
     return picture
 
 
-def _picture(viewer: Viewer, scene: str, elapsed: float) -> Picture:
+def _picture(viewer: Viewer, scene: str, elapsed: float) -> LatestAnswers:
     from collision_monitor import codec
-    from collision_monitor.cli.output.live_table import Picture
+    from collision_monitor.cli.output.live_table import LatestAnswers
 
-    return Picture(
+    return LatestAnswers(
         title=f"collision_monitor, scene {scene}",
         elapsed=elapsed,
         contacts=None if viewer.contacts is None else codec.decode_contacts(viewer.contacts),
@@ -203,7 +203,7 @@ def _picture(viewer: Viewer, scene: str, elapsed: float) -> Picture:
     )
 
 
-def _capture(picture: Picture, path: Path) -> None:
+def _capture(picture: LatestAnswers, path: Path) -> None:
     from rich.console import Console
 
     with open(os.devnull, "w") as nowhere:

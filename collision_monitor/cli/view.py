@@ -90,7 +90,7 @@ def _view_session(args: argparse.Namespace, stop: StopRequest) -> None:
     from collision_monitor.session import Session
     from collision_monitor.view.player import Player
     from collision_monitor.view.recording import Recording
-    from collision_monitor.view.timeline import Timeline
+    from collision_monitor.view.timeline import PlayerControls
     from collision_monitor.view.view import PERIOD, View
 
     session = Session(args.session)
@@ -99,7 +99,7 @@ def _view_session(args: argparse.Namespace, stop: StopRequest) -> None:
     server = start_server(args.host, args.port)
     view = View(server)
     player = Player(recording.times[-1])
-    timeline = Timeline(server, recording, player, view.requests)
+    timeline = PlayerControls(server, recording, player, view.requests)
     view.panel.add_rest()
     _announce(server, args, recording.name)
     shown, last = -1, time.monotonic()
@@ -120,14 +120,14 @@ def _view_session(args: argparse.Namespace, stop: StopRequest) -> None:
 
 
 def _view_live(args: argparse.Namespace, stop: StopRequest) -> None:
-    from collision_monitor.view.scene import Scene
+    from collision_monitor.view.scene import TopicContent
     from collision_monitor.view.state_text import status_notes
     from collision_monitor.view.view import PERIOD, View
 
     server = start_server(args.host, args.port)
     view = View(server)
     view.panel.add_rest()
-    scene = Scene()
+    scene = TopicContent()
     monitor = args.monitor.strip("/")
 
     def take(kind: str, data: bytes) -> None:

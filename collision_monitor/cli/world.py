@@ -68,10 +68,10 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--monitor", default=NODE, metavar="NAME", help="name of the monitor node (default: object_monitor)"
     )
     parser.add_argument("--ros-args", nargs=argparse.REMAINDER, default=[], metavar="…", help="arguments for ROS")
-    parser.set_defaults(command=play)
+    parser.set_defaults(command=publish_scene)
 
 
-def play(args: argparse.Namespace) -> int:
+def publish_scene(args: argparse.Namespace) -> int:
     """Publish the scene until its end, SIGINT or SIGTERM, and return the exit code. Raises UsageError."""
     from collision_monitor.world import check_path, describe, scene_names
 

@@ -101,7 +101,7 @@ KDOP_DIRECTIONS: Final = {6: _FACES, 14: _FACES + _CORNERS, 18: _FACES + _EDGES,
 """The usual sets of directions by k: normals of a cube's faces, with corners cut off, edges cut off, or both."""
 
 
-def kdop(points: ArrayLike, directions: ArrayLike | int = 14) -> Kdop:
+def kdop_of_points(points: ArrayLike, directions: ArrayLike | int = 14) -> Kdop:
     """k-DOP around points (n, 3): k from KDOP_DIRECTIONS, or own directions (k/2, 3) of any length but zero.
 
     (Slide "Bounding Slabs": "arbitrary (user-specified) collection of bounding plane-pairs"; Klosowski et al., 1998)

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.coordinates import Indices, coordinates, triangles
 from collision_monitor.geometry.point_triangle import closest_point_on_triangle
-from collision_monitor.geometry.points import closest_point_on_segment, distance
+from collision_monitor.geometry.points import closest_point_on_segment, point_distance
 from collision_monitor.tolerances import FEATURE_TIE
 
 
@@ -85,11 +85,11 @@ def classify_contact(
     """Features at the witness points (3,) of two meshes in one frame, for a contact normal (3,) from A to B."""
     normal = coordinates(normal, "normal", 3)
     return FeatureContact(
-        feature_at(point_a, normal, vertices_a, faces_a), feature_at(point_b, -normal, vertices_b, faces_b)
+        mesh_feature_at(point_a, normal, vertices_a, faces_a), mesh_feature_at(point_b, -normal, vertices_b, faces_b)
     )
 
 
-def feature_at(
+def mesh_feature_at(
     point: ArrayLike,
     normal: ArrayLike,
     vertices: ArrayLike,
@@ -124,12 +124,12 @@ def feature_at(
     if len(whole):
         return _face(faces, int(whole[0]))
     edges = np.unique(np.sort(faces[near][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
-    on_edge = distance(at, closest_point_on_segment(at, *np.moveaxis(vertices[edges], 1, 0))[0]) <= reach
+    on_edge = point_distance(at, closest_point_on_segment(at, *np.moveaxis(vertices[edges], 1, 0))[0]) <= reach
     across = edges[on_edge & touching[edges].all(axis=1)]
     if len(across):
         return Feature(FeatureType.EDGE, (int(across[0, 0]), int(across[0, 1])), -1)
     corners = np.unique(faces[near])
-    at_corner = corners[distance(at, vertices[corners]) <= reach]
+    at_corner = corners[point_distance(at, vertices[corners]) <= reach]
     if len(at_corner):
         return Feature(FeatureType.VERTEX, (int(at_corner[0]),), -1)
     if on_edge.any():

@@ -28,7 +28,7 @@ def coordinates(value: ArrayLike, what: str, *widths: int) -> Array:
     return array
 
 
-def numbers(value: ArrayLike, what: str, least: float = -np.inf) -> Array:
+def checked_numbers(value: ArrayLike, what: str, least: float = -np.inf) -> Array:
     """Finite numbers (...) >= `least`. Raises InputError."""
     try:
         array = np.asarray(value, dtype=np.float64)

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.coordinates import Array, Booleans, Signs, coordinates, numbers
-from collision_monitor.geometry.orientation import cross, orient2d
+from collision_monitor.geometry.coordinates import Array, Booleans, Signs, checked_numbers, coordinates
+from collision_monitor.geometry.orientation import orient2d, segments_cross
 
 
 class LineKind(Enum):
@@ -46,7 +46,7 @@ class Intersection(NamedTuple):
 def point_at(a: ArrayLike, b: ArrayLike, t: ArrayLike) -> Array:
     """Parametric form: the points a + t (b - a) (..., 2 or 3)."""
     a = coordinates(a, "a")
-    return np.asarray(a + numbers(t, "t")[..., None] * (coordinates(b, "b") - a))
+    return np.asarray(a + checked_numbers(t, "t")[..., None] * (coordinates(b, "b") - a))
 
 
 def implicit_line(a: ArrayLike, b: ArrayLike) -> tuple[Array, Array, Array]:
@@ -90,7 +90,7 @@ def intersect(
         a, b, c, d = np.broadcast_arrays(a, b, c, d)
     except ValueError:
         raise InputError(f"expected shapes that broadcast, got {a.shape}, {b.shape}, {c.shape}, {d.shape}") from None
-    turn = np.asarray(cross(a, b, c, d))
+    turn = np.asarray(segments_cross(a, b, c, d))
     at_a, at_b = np.asarray(orient2d(c, d, a)), np.asarray(orient2d(c, d, b))
     at_c, at_d = np.asarray(orient2d(a, b, c)), np.asarray(orient2d(a, b, d))
     parallel = turn == 0.0

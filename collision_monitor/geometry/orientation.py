@@ -50,7 +50,7 @@ def exact_limit(most: int) -> Iterator[list[int]]:
         _limits.reset(token)
 
 
-def cross(a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> Array:
+def segments_cross(a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> Array:
     """(b - a) x (d - c) in m² of points (..., 2): positive if d - c turns left from b - a, 0 if parallel."""
     a, b, c, d = _together(2, a, b, c, d)
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):
@@ -65,7 +65,7 @@ def cross(a: ArrayLike, b: ArrayLike, c: ArrayLike, d: ArrayLike) -> Array:
 
 def orient2d(a: ArrayLike, b: ArrayLike, p: ArrayLike) -> Array:
     """Twice the signed area (m²) of triangles a, b, p (..., 2): positive if p is left of the line from a to b."""
-    return cross(a, b, a, p)
+    return segments_cross(a, b, a, p)
 
 
 def orient3d(a: ArrayLike, b: ArrayLike, c: ArrayLike, p: ArrayLike) -> Array:

@@ -19,7 +19,7 @@ class Location(IntEnum):
     INSIDE = 1
 
 
-def locate(points: ArrayLike, polygon: ArrayLike) -> Signs:
+def locate_in_polygon(points: ArrayLike, polygon: ArrayLike) -> Signs:
     """Location (...) of points (..., 2) in a simple polygon (n, 2), by the parity of a ray towards +x.
 
     (Slides "Point in polygon – ray test", "Ray test special cases".) The special cases need no epsilon:

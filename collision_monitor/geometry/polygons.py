@@ -12,13 +12,13 @@ from numpy.typing import ArrayLike
 from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.coordinates import Array, Indices, point_set
 from collision_monitor.geometry.lines import Relation, intersect
-from collision_monitor.geometry.orientation import cross
-from collision_monitor.geometry.point_in_polygon import Location, locate
-from collision_monitor.geometry.points import closest_point_on_segment, distance
+from collision_monitor.geometry.orientation import segments_cross
+from collision_monitor.geometry.point_in_polygon import Location, locate_in_polygon
+from collision_monitor.geometry.points import closest_point_on_segment, point_distance
 from collision_monitor.tolerances import EPSILON
 
 
-def corners(points: ArrayLike) -> Indices:
+def polygon_corners(points: ArrayLike) -> Indices:
     """Indices of the corners of a polygon (n, 2) that differ from the one before. Raises ShapeError if fewer than 3."""
     polygon = point_set(points, "polygon", 2, least=3)
     kept = np.flatnonzero((polygon != np.roll(polygon, 1, axis=0)).any(axis=1))
@@ -38,15 +38,15 @@ def signed_area(points: ArrayLike) -> float:
 def is_counter_clockwise(points: ArrayLike) -> bool:
     """Whether the corners of a simple polygon (n, 2) are counter-clockwise, exactly, by its lowest leftmost corner."""
     polygon = point_set(points, "polygon", 2, least=3)
-    polygon = polygon[corners(polygon)]
-    return bool(turns(polygon)[np.lexsort((polygon[:, 1], polygon[:, 0]))[0]] > 0.0)
+    polygon = polygon[polygon_corners(polygon)]
+    return bool(corner_turns(polygon)[np.lexsort((polygon[:, 1], polygon[:, 0]))[0]] > 0.0)
 
 
-def turns(points: ArrayLike) -> Array:
+def corner_turns(points: ArrayLike) -> Array:
     """Cross products (n,) of the edges at each corner: positive for a left turn, 0 for straight on, exact in sign."""
     polygon = point_set(points, "polygon", 2, least=3)
     before, after = np.roll(polygon, 1, axis=0), np.roll(polygon, -1, axis=0)
-    return np.asarray(cross(before, polygon, polygon, after))
+    return np.asarray(segments_cross(before, polygon, polygon, after))
 
 
 def is_convex(points: ArrayLike) -> bool:
@@ -56,8 +56,8 @@ def is_convex(points: ArrayLike) -> bool:
     Raises ShapeError if all corners are on one line.
     """
     polygon = point_set(points, "polygon", 2, least=3)
-    polygon = polygon[corners(polygon)]
-    sign = np.sign(turns(polygon))
+    polygon = polygon[polygon_corners(polygon)]
+    sign = np.sign(corner_turns(polygon))
     if not sign.any():
         raise ShapeError("polygon: expected an area, got corners on one line")
     # on a single winding, the edges' direction changes from leftward to rightward and back exactly once
@@ -73,11 +73,11 @@ def interior_angles(points: ArrayLike) -> Array:
     (Slide "Convex and concave – interior angles"). Raises ShapeError if a corner is repeated.
     """
     polygon = point_set(points, "polygon", 2, least=3)
-    if len(corners(polygon)) < len(polygon):
+    if len(polygon_corners(polygon)) < len(polygon):
         raise ShapeError("polygon: expected different neighbouring corners, got an edge without length")
     arriving = polygon - np.roll(polygon, 1, axis=0)
     leaving = np.roll(arriving, -1, axis=0)
-    turning = np.arctan2(turns(polygon), (arriving * leaving).sum(axis=1))
+    turning = np.arctan2(corner_turns(polygon), (arriving * leaving).sum(axis=1))
     return np.asarray(np.pi - (turning if is_counter_clockwise(polygon) else -turning))
 
 
@@ -89,14 +89,14 @@ def passes_line_test(points: ArrayLike) -> bool:
     of the size passes; the exact test is `is_convex`.
     """
     polygon = point_set(points, "polygon", 2, least=3)
-    polygon = polygon[corners(polygon)]
+    polygon = polygon[polygon_corners(polygon)]
     i, j = np.triu_indices(len(polygon), 1)
     middle = 0.5 * polygon[i] + 0.5 * polygon[j]
-    outside = middle[locate(middle, polygon) == Location.OUTSIDE]
+    outside = middle[locate_in_polygon(middle, polygon) == Location.OUTSIDE]
     if not len(outside):
         return True
     on_edge, _ = closest_point_on_segment(outside[:, None], polygon[None], np.roll(polygon, -1, axis=0)[None])
-    away = distance(outside[:, None], on_edge).min(axis=1)
+    away = point_distance(outside[:, None], on_edge).min(axis=1)
     return bool((away <= 4 * EPSILON * np.abs(polygon).max()).all())
 
 
@@ -106,7 +106,7 @@ def crossing_edges(points: ArrayLike) -> tuple[int, int] | None:
     Neighbouring edges may share only their common corner, other edges nothing. Exact.
     """
     polygon = point_set(points, "polygon", 2, least=3)
-    index = corners(polygon)
+    index = polygon_corners(polygon)
     start = polygon[index]
     end = np.roll(start, -1, axis=0)
     n = len(start)

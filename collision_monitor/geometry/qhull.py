@@ -34,10 +34,10 @@ def qhull(points: Array) -> Any | None:
 
 def hull_vertices(points: Array) -> NDArray[np.int32]:
     """Indices of the points (n, 3) that span their convex hull, ascending; all distinct points if Qhull fails."""
-    return Hull(points).vertices
+    return QhullResult(points).vertices
 
 
-class Hull:
+class QhullResult:
     """Convex hull of points (n, 3), n >= 1, in m.
 
     vertices: indices of the points that span it, ascending; all distinct points if Qhull fails.

@@ -12,7 +12,7 @@ import numpy as np
 
 from collision_monitor.geometry.contact_features import Feature, FeatureType
 from collision_monitor.geometry.coordinates import Array
-from collision_monitor.geometry.points import closest_point_on_segment, distance
+from collision_monitor.geometry.points import closest_point_on_segment, point_distance
 
 ROUND_TIE: Final = 1e-6
 """A point within this part of the size of a rim or an apex is on it; a direction within this angle (rad) is along an
@@ -38,7 +38,7 @@ def feature_of_cylinder(point: Array, normal: Array, radius: float, length: floa
 def feature_of_cone(point: Array, normal: Array, radius: float, length: float) -> Feature:
     """Feature at a point (3,) in the frame of a cone: its apex is vertex 0, its rim edge 0, its base face 0."""
     tie = ROUND_TIE * (radius + length)
-    if distance(point, np.array([0.0, 0.0, length / 2])) <= tie:
+    if point_distance(point, np.array([0.0, 0.0, length / 2])) <= tie:
         return Feature(FeatureType.VERTEX, (0,), -1)
     slope = (length * normal[2] - radius * np.hypot(normal[0], normal[1])) / np.hypot(length, radius)
     if abs(point[2] + length / 2) > tie or abs(slope) <= ROUND_TIE:  # a line of the slant touches as a whole
@@ -57,10 +57,10 @@ def feature_of_outline(point: Array, normal: Array, corners: Array) -> Feature:
     tie = ROUND_TIE * float(np.ptp(corners, axis=0).max())
     start = np.arange(len(corners)) if len(corners) > 2 else np.arange(1)
     end = (start + 1) % len(corners)
-    away = distance(point, closest_point_on_segment(point, corners[start], corners[end])[0])
+    away = point_distance(point, closest_point_on_segment(point, corners[start], corners[end])[0])
     level = np.abs((corners - point) @ normal) <= tie
     whole = np.flatnonzero((away <= tie) & level[start] & level[end])
-    at = distance(point, corners)
+    at = point_distance(point, corners)
     if not len(whole) and at.min() <= tie:
         return Feature(FeatureType.VERTEX, (int(at.argmin()),), -1)
     edge = int(whole[0]) if len(whole) else int(away.argmin())

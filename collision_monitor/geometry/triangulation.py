@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.coordinates import Array, Indices, point_set
 from collision_monitor.geometry.orientation import orient2d
-from collision_monitor.geometry.polygons import corners, crossing_edges, is_counter_clockwise
+from collision_monitor.geometry.polygons import crossing_edges, is_counter_clockwise, polygon_corners
 
 MOST_CORNERS: Final = 2000
 """Corners of a concave polygon. It has that many times as many pairs of edges, which take 0.3 GB, and up to a minute.
@@ -34,7 +34,7 @@ def triangulate(points: ArrayLike) -> Indices:
     if crossing is not None:
         i, j = crossing
         raise ShapeError(f"polygon: expected a simple one, but the edges from corners {i} and {j} meet")
-    ring = corners(polygon)
+    ring = polygon_corners(polygon)
     if not is_counter_clockwise(polygon):
         ring = ring[::-1]
     ears = []

@@ -103,7 +103,7 @@ def _bend(table, s, w, u, offset):
 
 
 @inlined
-def advance(table, at, n, m, rate, gap, until):
+def advance_along_axis(table, at, n, m, rate, gap, until):
     """Return a time d in (0, until] (s) up to which the gap along the axis n (unit) stays positive; close to the last.
 
     m: change of n per second, across it (1/s). rate: growth of the gap without motion, from the tube (m/s). gap: along

@@ -14,7 +14,7 @@ import numpy as np
 
 from collision_monitor._jit import device, inlined, outlined
 from collision_monitor._jit.vectors import LANES
-from collision_monitor.impact.advance import Placed, advance
+from collision_monitor.impact.advance import Placed, advance_along_axis
 from collision_monitor.impact.impact_record import (
     CLEAR,
     CLOSED_FORM,
@@ -26,7 +26,7 @@ from collision_monitor.impact.impact_record import (
 from collision_monitor.impact.mesh_impact import mesh_impact
 from collision_monitor.impact.mesh_pair import has_mesh, shapes_within, triangles_contact
 from collision_monitor.impact.overlap_time import overlap_time
-from collision_monitor.impact.sphere_interval import approach_at, meeting_of_spheres, sphere_interval
+from collision_monitor.impact.sphere_interval import meeting_of_spheres, relative_motion_at, sphere_interval
 from collision_monitor.meshes.distance.nearest import MEMORY, PLACE_A, PLACE_B, answer_row
 from collision_monitor.motion.bodies import next_pair, place_shape
 from collision_monitor.motion.motion import half_acceleration, relative_position, relative_velocity, rotation_at
@@ -166,7 +166,7 @@ def shape_impact(table, parts, pair, window, tube, query, scratch):
         aim = gap - 0.5 * query.tolerance
         d, m, until = 0.0, AT_REST, end - t
         for turns in range(2):
-            d = max(d, advance(table, at, n, m, -tube.growth, aim, until))
+            d = max(d, advance_along_axis(table, at, n, m, -tube.growth, aim, until))
             if turns or t == t_before or d >= until:
                 break
             m = _turning(n_before, n, t - t_before)
@@ -304,7 +304,7 @@ def body_impact(multibody, i, j, window, query, scratch, event):
     A, B = bodies.motion[i], bodies.motion[j]
     event.status = CLEAR
     tube = tube_of(A, B, begin)
-    approach = approach_at(A, B, begin)
+    approach = relative_motion_at(A, B, begin)
     bent = half_acceleration(A, B) * (end - begin)  # m/s: the path deviates from its tangent by less
     # every impact lies in the time in which the bounding spheres overlap
     first, last = 0.0, end - begin

@@ -29,7 +29,7 @@ from collision_monitor.impact.impact_record import (
 )
 from collision_monitor.impact.mesh_pair import enclosure, has_mesh, have_trees, is_mesh
 from collision_monitor.impact.pair_impacts import PREFETCH_AHEAD, window_of
-from collision_monitor.impact.sphere_interval import approach_at, meeting_of_spheres, sphere_interval
+from collision_monitor.impact.sphere_interval import meeting_of_spheres, relative_motion_at, sphere_interval
 from collision_monitor.meshes.overlap.inside import OUTSIDE
 from collision_monitor.motion.motion import half_acceleration, relative_position, relative_velocity
 from collision_monitor.narrow_phase.contact_row import NORMAL, POINT_A, POINT_B
@@ -73,7 +73,7 @@ def _overlap(table, parts, pair, t, allowed, scratch):
 def _together(A, B, window, margin):
     """First and last time (s) after the begin of a window at which the bounding spheres of two motions may overlap."""
     begin, end = window
-    tube, approach = tube_of(A, B, begin), approach_at(A, B, begin)
+    tube, approach = tube_of(A, B, begin), relative_motion_at(A, B, begin)
     growth = tube.growth + half_acceleration(A, B) * (end - begin)
     return sphere_interval(approach.p, approach.v, A.radius + B.radius + margin + tube.start, growth, end - begin, 1.0)
 
@@ -91,7 +91,7 @@ def coarse_impact(multibody, i, j, window, query, near, scratch, event):
         i, j = j, i
     A, B = bodies.motion[i], bodies.motion[j]
     event.status = CLEAR
-    tube, approach = tube_of(A, B, begin), approach_at(A, B, begin)
+    tube, approach = tube_of(A, B, begin), relative_motion_at(A, B, begin)
     first, last = _together(A, B, window, query.margin)
     if first > last:
         return True

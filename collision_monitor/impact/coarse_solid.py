@@ -8,7 +8,7 @@ from collision_monitor._jit import device
 from collision_monitor.impact.coarse_trees import KEEP, STEPS, TOO_MANY, box_radius, nearness, pose_at
 from collision_monitor.impact.impact_record import CLEAR, UNRESOLVED
 from collision_monitor.impact.mesh_pair import is_mesh, root_of
-from collision_monitor.impact.tree_impact import HEAP, approach_at, pop_first, push_pair, times_of
+from collision_monitor.impact.tree_impact import HEAP, pop_first, push_pair, times_of, tree_approach_at
 from collision_monitor.meshes.boxes import half_of
 from collision_monitor.meshes.distance.contact import reach_in
 from collision_monitor.meshes.distance.nearest import BOUNDS, PAIRS, size_of
@@ -16,9 +16,9 @@ from collision_monitor.meshes.distance.point_range import point_range
 from collision_monitor.meshes.distance.solid import (
     MovingSolid,
     SolidMemory,
+    box_reach_along,
     center_of,
     leaf_solid_time,
-    reach_along,
     solid_time,
 )
 from collision_monitor.meshes.distance.solid_range import solid_range
@@ -39,7 +39,7 @@ def _box_time(blocks, block, k, solid):
     c, e = center_of(blocks, block, k), half_of(blocks, block, k)
     lower, _, n = point_range(table, b, place_point(inverse(X), c))
     n = minus((X.x, X.y, X.z), place_point(X, n))
-    gap, turn = lower - reach_along(blocks, block, k, n), reach_along(blocks, block, k, cross(n, move.w_a))
+    gap, turn = lower - box_reach_along(blocks, block, k, n), box_reach_along(blocks, block, k, cross(n, move.w_a))
     return solid_time(table, b, X, n, gap - move.start, c, sqrt(dot(e, e)), turn, move)
 
 
@@ -57,7 +57,7 @@ def solid_near(table, parts, pair, now, window, tube, query, near, scratch):
         waiting = pop_first(work, waiting)
         steps += 1
         margin = query.margin + tube.start + tube.growth * (t - begin)
-        p, move = approach_at(table, parts, pair, t, margin, tube.growth, end, scratch)
+        p, move = tree_approach_at(table, parts, pair, t, margin, tube.growth, end, scratch)
         R_a, R_b = scratch.rotation[2], scratch.rotation[3]
         X = relative(R_a, R_b, p)
         solid = MovingSolid(table, b, PairPose(R_a, R_b, p), X, move)

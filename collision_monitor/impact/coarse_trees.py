@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 from collision_monitor._jit import device, inlined
 from collision_monitor.impact.impact_record import CLEAR, UNRESOLVED
 from collision_monitor.impact.mesh_pair import root_of, triangles_contact
-from collision_monitor.impact.tree_impact import HEAP, approach_at, open_box, pop_first, push_pair, times_of
+from collision_monitor.impact.tree_impact import HEAP, open_box, pop_first, push_pair, times_of, tree_approach_at
 from collision_monitor.meshes.advance.leaf_times import leaf_time
 from collision_monitor.meshes.distance.contact import reach_in
 from collision_monitor.meshes.distance.depth_range import depth_range
@@ -83,7 +83,7 @@ def trees_near(table, parts, pair, now, window, tube, query, near, scratch):
         a, i, b, j = int(place_a) // WIDTH, int(place_a) % WIDTH, int(place_b) // WIDTH, int(place_b) % WIDTH
         child_a, child_b = blocks[a, CHILD, i], blocks[b, CHILD, j]
         wanted = query.margin + tube.start + tube.growth * (t - begin)
-        p, move = approach_at(table, parts, pair, t, wanted, tube.growth, end, scratch)
+        p, move = tree_approach_at(table, parts, pair, t, wanted, tube.growth, end, scratch)
         X = relative(scratch.rotation[2], scratch.rotation[3], p)
         c = place_point(X, (blocks[b, CENTER, j], blocks[b, CENTER + 1, j], blocks[b, CENTER + 2, j]))
         w = c[0] - blocks[a, CENTER, i], c[1] - blocks[a, CENTER + 1, i], c[2] - blocks[a, CENTER + 2, i]
@@ -123,7 +123,7 @@ def trees_near(table, parts, pair, now, window, tube, query, near, scratch):
 @device
 def pose_at(table, parts, pair, t, scratch):
     """Pose (PairPose) of a pair of shapes at time t (s)."""
-    p, _ = approach_at(table, parts, pair, t, 0.0, 0.0, t, scratch)
+    p, _ = tree_approach_at(table, parts, pair, t, 0.0, 0.0, t, scratch)
     return PairPose(scratch.rotation[2], scratch.rotation[3], p)
 
 

@@ -6,7 +6,7 @@ from collision_monitor._jit import device
 from collision_monitor.impact.impact_record import CLEAR, HIT, UNRESOLVED
 from collision_monitor.impact.mesh_pair import enclosure, have_trees, is_mesh
 from collision_monitor.impact.solid_impact import solid_impact
-from collision_monitor.impact.tree_impact import approach_at, tree_impact
+from collision_monitor.impact.tree_impact import tree_approach_at, tree_impact
 from collision_monitor.meshes.distance.nearest import PLACE_A
 from collision_monitor.meshes.overlap.inside import INSIDE, OUTSIDE
 from collision_monitor.narrow_phase.pair_pose import PairPose
@@ -33,5 +33,5 @@ def mesh_impact(table, parts, pair, window, tube, query, scratch):
 @device
 def _enclosure_at(table, parts, pair, t, scratch):
     """`enclosure` of a pair at time t (s)."""
-    p, _ = approach_at(table, parts, pair, t, 0.0, 0.0, t, scratch)
+    p, _ = tree_approach_at(table, parts, pair, t, 0.0, 0.0, t, scratch)
     return enclosure(table, pair.a, pair.b, PairPose(scratch.rotation[2], scratch.rotation[3], p), scratch)

@@ -12,10 +12,10 @@ from collision_monitor.meshes.distance.feature import (
     off_triangle,
     triangle_feature,
 )
-from collision_monitor.meshes.distance.nearest import PLACE_A, PLACE_B, nearest, triangle_at
+from collision_monitor.meshes.distance.nearest import PLACE_A, PLACE_B, nearest_triangles, triangle_at
 from collision_monitor.meshes.distance.solid import SolidMemory, solid_contact
 from collision_monitor.meshes.layout import CLOSED, FACE, MOST_PARTS, PARTS, WIDTH
-from collision_monitor.meshes.overlap.inside import INSIDE, OUTSIDE, is_either_in, locate
+from collision_monitor.meshes.overlap.inside import INSIDE, OUTSIDE, is_either_in, locate_in_surface
 from collision_monitor.meshes.overlap.touching import contact_of_places
 from collision_monitor.meshes.placing import inverse, relative
 from collision_monitor.narrow_phase.contact_row import (
@@ -89,7 +89,7 @@ def enclosure(table, a, b, pose, scratch):
         if _may_hold_many(table, a, b) or _may_hold_many(table, b, a):
             place_a, place_b = answer[PLACE_A], answer[PLACE_B]
             answer[PLACE_A] = answer[PLACE_B] = -1.0
-            clear = nearest(blocks, first, blocks, second, X, inf, answer, work)
+            clear = nearest_triangles(blocks, first, blocks, second, X, inf, answer, work)
             answer[PLACE_A], answer[PLACE_B] = place_a, place_b
         return is_either_in(blocks, first, blocks, second, X, clear, work)
     mesh, solid = (a, b) if is_mesh(table, a) else (b, a)
@@ -98,7 +98,7 @@ def enclosure(table, a, b, pose, scratch):
         return OUTSIDE
     if mesh != a:
         X = inverse(X)
-    return locate(table.blocks, root, (X.x, X.y, X.z), scratch.tree)  # the solid's origin is inside it
+    return locate_in_surface(table.blocks, root, (X.x, X.y, X.z), scratch.tree)  # the solid's origin is inside it
 
 
 @outlined

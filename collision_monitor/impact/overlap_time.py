@@ -7,7 +7,7 @@ from typing import Final
 
 from collision_monitor._jit import inlined, outlined
 from collision_monitor.impact.mesh_pair import has_mesh, have_trees, root_of
-from collision_monitor.impact.tree_impact import approach_at
+from collision_monitor.impact.tree_impact import tree_approach_at
 from collision_monitor.meshes.advance.approach import time_until
 from collision_monitor.meshes.distance.contact import reach_in
 from collision_monitor.meshes.overlap.common_point import bounds_solid, common_ball
@@ -53,7 +53,7 @@ def overlap_time(table, parts, pair, known, window, tube, query, scratch):
     if not (bounds_solid(blocks, root_a) and bounds_solid(blocks, root_b)):
         return sure
     end = min(window.end, sure)
-    p, move = approach_at(table, parts, pair, start, 0.0, 0.0, end, scratch)
+    p, move = tree_approach_at(table, parts, pair, start, 0.0, 0.0, end, scratch)
     reach_a, reach_b = reach_in(blocks, root_a), reach_in(blocks, root_b)
     speed = sqrt(dot(move.v, move.v)) + sqrt(move.bend_a) * reach_a + sqrt(move.bend_b) * reach_b
     bend = move.bend + move.bend_a * reach_a + move.bend_b * reach_b
@@ -67,7 +67,7 @@ def overlap_time(table, parts, pair, known, window, tube, query, scratch):
         t = min(start + elapsed, end)
         if not (elapsed < inf and t < sure):
             break
-        p, _ = approach_at(table, parts, pair, t, 0.0, 0.0, end, scratch)
+        p, _ = tree_approach_at(table, parts, pair, t, 0.0, 0.0, end, scratch)
         X = relative(scratch.rotation[2], scratch.rotation[3], p)
         radius = 0.5 * (_wanted(table, pair, t, window, tube, query) + part)
         moved = speed * elapsed + 0.5 * bend * elapsed * elapsed if elapsed > 0.0 else inf

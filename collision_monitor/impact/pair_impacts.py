@@ -13,7 +13,7 @@ from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.impact.body_impact import ShapePair, Tube, Window, body_impact, tube_of
 from collision_monitor.impact.impact_record import BOUND_ONLY, CLEAR, UNRESOLVED, write_pair
 from collision_monitor.impact.overlap_time import overlap_time
-from collision_monitor.impact.sphere_interval import approach_at, meeting_of_spheres, sphere_interval
+from collision_monitor.impact.sphere_interval import meeting_of_spheres, relative_motion_at, sphere_interval
 from collision_monitor.motion.bodies import next_pair
 from collision_monitor.motion.motion import half_acceleration
 
@@ -79,7 +79,7 @@ def bound_impact(bodies, i, j, window, margin, event):
     A, B = bodies.motion[i], bodies.motion[j]
     event.status = CLEAR
     tube = tube_of(A, B, begin)
-    approach = approach_at(A, B, begin)
+    approach = relative_motion_at(A, B, begin)
     bent = half_acceleration(A, B) * (end - begin)
     reach = A.radius + B.radius + margin + tube.start
     first, last = sphere_interval(approach.p, approach.v, reach, tube.growth + bent, end - begin, 1.0)

@@ -16,11 +16,11 @@ from collision_monitor.impact.tree_impact import (
     HEAP,
     KEEP,
     STEPS,
-    approach_at,
     pop_first,
     push_pair,
     spins,
     times_of,
+    tree_approach_at,
 )
 from collision_monitor.meshes.distance.contact import reach_in
 from collision_monitor.meshes.distance.nearest import BOUNDS, PAIRS, size_of
@@ -60,7 +60,7 @@ def solid_impact(table, parts, pair, window, tube, query, scratch):
         if steps > most:
             return UNRESOLVED, t, 1 + steps // STEPS, 0.0
         margin = query.margin + tube.start + tube.growth * (t - begin)
-        p, move = approach_at(table, parts, pair, t, margin, tube.growth, end, scratch)
+        p, move = tree_approach_at(table, parts, pair, t, margin, tube.growth, end, scratch)
         R_a, R_b = scratch.rotation[2], scratch.rotation[3]
         solid = MovingSolid(table, b, PairPose(R_a, R_b, p), relative(R_a, R_b, p), move)
         i, k = int(place) // WIDTH, int(place) % WIDTH

@@ -13,7 +13,7 @@ _SMALLEST: Final = 1e-240
 """m^4/s^2: product of a squared length and a squared speed below which round-off nears the smallest float64."""
 
 
-class Approach(NamedTuple):
+class RelativeMotion(NamedTuple):
     """Position (m) and velocity (m/s) of the second of two bodies relative to the first, at one time."""
 
     p: Any  # (3,)
@@ -21,9 +21,9 @@ class Approach(NamedTuple):
 
 
 @inlined
-def approach_at(A, B, t):
+def relative_motion_at(A, B, t):
     """Approach of motion B to motion A (MOTION) at time t."""
-    return Approach(relative_position(A, B, t), relative_velocity(A, B, t))
+    return RelativeMotion(relative_position(A, B, t), relative_velocity(A, B, t))
 
 
 @device

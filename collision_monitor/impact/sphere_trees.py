@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.impact.body_impact import Window, tube_of
 from collision_monitor.impact.impact_record import CLEAR, TREE_BOUND
-from collision_monitor.impact.sphere_interval import approach_at, meeting_of_spheres, sphere_interval
+from collision_monitor.impact.sphere_interval import meeting_of_spheres, relative_motion_at, sphere_interval
 from collision_monitor.motion.motion import half_acceleration, rotation_at
 from collision_monitor.shapes.shape_table import BOX, CONVEX_HULL
 from collision_monitor.tolerances import ROUNDED_UP
@@ -164,7 +164,7 @@ def tree_meeting(bodies, trees, i, j, window, margin, rotation):
     R_i, R_j = rotation[0], rotation[1]
     begin, end = window
     tube = tube_of(A, B, begin)
-    p, v = approach_at(A, B, begin)
+    p, v = relative_motion_at(A, B, begin)
     growth = tube.growth + half_acceleration(A, B) * (end - begin)  # bounds the deviation from the tangent
     reach = A.radius + B.radius + margin + tube.start
     soonest, last = sphere_interval(p, v, reach, growth, end - begin, 1.0)
@@ -229,5 +229,5 @@ def tighten(bodies, trees, events, now, margin, rotation):
                 event.status = CLEAR
             elif wait > 0.0:
                 event.lower = window.begin + wait
-                meeting_of_spheres(A, B, approach_at(A, B, window.begin), window.begin, wait, event)
+                meeting_of_spheres(A, B, relative_motion_at(A, B, window.begin), window.begin, wait, event)
         event.method = TREE_BOUND

@@ -103,7 +103,7 @@ def pop_first(heap, count):
 
 
 @inlined
-def approach_at(table, parts, pair, t, margin, growth, until, scratch):
+def tree_approach_at(table, parts, pair, t, margin, growth, until, scratch):
     """Position of shape b's origin relative to that of a in world axes (m), and the Approach of both in a's axes.
 
     Writes the rotations of the shapes to world axes into scratch.rotation[2] and [3]. margin: gap that counts as
@@ -205,7 +205,7 @@ def tree_impact(table, parts, pair, window, tube, query, scratch):
         if t != now and (t < now or not (t - now) * speed < SAME * size):
             now = t
             margin = query.margin + tube.start + tube.growth * (t - begin)
-            p, move = approach_at(table, parts, pair, t, margin, tube.growth, end, scratch)
+            p, move = tree_approach_at(table, parts, pair, t, margin, tube.growth, end, scratch)
             X = relative(scratch.rotation[2], scratch.rotation[3], p)
             speed = sqrt(dot(move.v, move.v)) + move.growth
             speed += sqrt(move.bend_a) * reach_in(blocks, root_a) + sqrt(move.bend_b) * reach_in(blocks, root_b)

@@ -10,7 +10,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from collision_monitor._jit import device, inlined
-from collision_monitor._jit.lanes import Lanes, load
+from collision_monitor._jit.lanes import Lanes, load_lanes
 from collision_monitor.meshes.boxes import Block
 from collision_monitor.meshes.layout import CHILD, WIDTH
 
@@ -28,7 +28,7 @@ def _below(typing_context, limit, numbers, at, blocks, block):
 
     def codegen(context, builder, signature, arguments):
         limit = Lanes.constant(builder, arguments[0])
-        number = load(context, builder, signature.args[1], arguments[1], arguments[2])
+        number = load_lanes(context, builder, signature.args[1], arguments[1], arguments[2])
         child = Block(context, builder, signature.args[3], arguments[3], arguments[4]).row(CHILD)
         less = builder.fcmp_ordered("<", number.value, limit.value)
         used = builder.fcmp_unordered("!=", child.value, Lanes.constant(builder, 0.0).value)

@@ -12,7 +12,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from collision_monitor._jit import device, inlined
-from collision_monitor._jit.lanes import Lanes, load, store
+from collision_monitor._jit.lanes import Lanes, load_lanes, store
 from collision_monitor.meshes.layout import AXES, CENTER, CORNERS, HALF, RADIUS, ROWS, WIDTH
 from collision_monitor.meshes.placing import Placing
 from collision_monitor.tolerances import SAT_ROUND_OFF
@@ -47,7 +47,7 @@ class Block:
     """The vectors of a block while a kernel is compiled."""
 
     def __init__(self, context: Any, builder: Any, array_type: Any, array: Any, block: Any) -> None:
-        self._load = lambda row: load(
+        self._load = lambda row: load_lanes(
             context, builder, array_type, array, builder.mul(block, block.type(ROWS * WIDTH)), WIDTH * row
         )
 
@@ -95,7 +95,7 @@ def _gap_bounds(typing_context, half, M, blocks, block, out, at):
         bound = _gaps(x, e, [inner(size[r], f) for r in range(3)], zero)
         y = [inner(_column(R, c), x) for c in range(3)]
         bound = bound.largest(_gaps(y, f, [inner(_column(size, c), e) for c in range(3)], zero))
-        known = load(context, builder, signature.args[4], arguments[4], arguments[5])
+        known = load_lanes(context, builder, signature.args[4], arguments[4], arguments[5])
         store(context, builder, known.largest(bound), signature.args[4], arguments[4], arguments[5])
         return context.get_dummy_value()
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from collision_monitor._jit import inlined
-from collision_monitor.meshes.distance.triangle_pair import Triangle
+from collision_monitor.meshes.distance.triangle_pair import Corners
 from collision_monitor.meshes.layout import AXES
 from collision_monitor.narrow_phase.vector import Vector
 
@@ -78,9 +78,9 @@ def turn_back(X: Placing, v: Vector) -> Vector:
 
 
 @inlined
-def place_triangle(X: Placing, T: Triangle) -> Triangle:
+def place_triangle(X: Placing, T: Corners) -> Corners:
     """A triangle of the other tree in this tree's frame."""
-    return Triangle(place_point(X, T.a), place_point(X, T.b), place_point(X, T.c))
+    return Corners(place_point(X, T.a), place_point(X, T.b), place_point(X, T.c))
 
 
 @inlined

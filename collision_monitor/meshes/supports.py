@@ -18,7 +18,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from collision_monitor._jit import device, inlined
-from collision_monitor._jit.lanes import Lanes, load, store
+from collision_monitor._jit.lanes import Lanes, load_lanes, store
 from collision_monitor._jit.vectors import DOUBLES
 from collision_monitor.meshes.boxes import Block, inner
 from collision_monitor.meshes.layout import AXES, CENTER, CORNERS_OF_BOX, EDGES, HALF, ROWS, WIDTH
@@ -30,7 +30,7 @@ PLANES: Final = ((0, 1, 2), (0, 2, 1), (1, 2, 0))
 
 
 @inlined
-def reach_along(blocks: Any, block: int, member: int, d: Vector) -> float:
+def content_reach_along(blocks: Any, block: int, member: int, d: Vector) -> float:
     """Bound on the largest d . x over the points x in a box of a tree, in the tree's frame (m, for a unit vector d)."""
     x, y, z = turned_back(blocks, block, member, d)
     p, q, r = int(x < 0.0), int(y < 0.0), int(z < 0.0)
@@ -137,7 +137,7 @@ def _extend(typing_context, x, reach):
             d = [Lanes(builder, ir.Constant(DOUBLES, column)) for column in columns]
             far = inner(d[:3], point[:3]).plus_product(d[3], point[3])
             place = ir.IntType(64)(at)
-            known = load(context, builder, *array, place)
+            known = load_lanes(context, builder, *array, place)
             store(context, builder, known.largest(far), *array, place)
         return context.get_dummy_value()
 

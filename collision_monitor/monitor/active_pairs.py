@@ -21,7 +21,7 @@ from collision_monitor.monitor.candidates import is_checked
 from collision_monitor.monitor.contacts.carried_contacts import (
     CARRIED,
     Carrying,
-    carry,
+    carry_contact,
     has_answer,
     keep,
     no_answers,
@@ -317,7 +317,9 @@ def _examine(multibody, active, which, now, queries, scratch, later):
         pair, event = pairs[k], events[k]
         i, j = pair.i, pair.j
         may_carry = carrying.tolerance > 0.0 and pair.touched == 1
-        if may_carry and carry(multibody, i, j, now, contact, carrying.tolerance, scratch, carried[k], results[k]):
+        if may_carry and carry_contact(
+            multibody, i, j, now, contact, carrying.tolerance, scratch, carried[k], results[k]
+        ):
             pair.touching, pair.leaving = 1, 0
             continue
         is_complete = plain_contact(multibody, i, j, now, contact, has_details, scratch, results[k])

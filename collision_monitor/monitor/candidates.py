@@ -13,12 +13,12 @@ from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.broad_phase.dense_grid import box_pairs
 from collision_monitor.broad_phase.hashed_grid import HashedGrid, make_hashed_grid, read_boxes, regridded, remove_boxes
 from collision_monitor.broad_phase.region import regions_overlap
-from collision_monitor.broad_phase.sorted_boxes import SortedBoxes, note_changed, overlapping, sorted_boxes
+from collision_monitor.broad_phase.sorted_boxes import SortedBoxes, note_changed, overlapping_boxes, sorted_boxes
 from collision_monitor.impact.impact_record import pair_key
 from collision_monitor.monitor.state.roster import FIRST_CAPACITY, Roster
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
-from collision_monitor.motion.bodies import Bodies
+from collision_monitor.motion.bodies import BodyTable
 from collision_monitor.motion.motion import swept_box
 
 MOST_TESTS: Final = 6_000
@@ -76,7 +76,7 @@ class Candidates(Stage):
             read_boxes(self.grid.box, centre, half)
             pairs = box_pairs(centre, half, is_new[:top] if len(which) < MOSTLY_NEW * top else None)
             return pairs[: keep_new(bodies, self.grid.box, pairs, is_new, step.now, margin)]
-        search = Search(which, is_new, np.empty(len(self.grid.box) + 1, np.int32))
+        search = GridSearch(which, is_new, np.empty(len(self.grid.box) + 1, np.int32))
         changed = which[:0]
         if not is_small:
             self._sorted = self._sorted or sorted_boxes(self.grid.box, top)
@@ -117,7 +117,7 @@ class Candidates(Stage):
 _NONE_ALLOWED: Final = np.zeros(0, np.uint64)
 
 
-def filters_of(bodies: Bodies) -> tuple[Any, Any, Any, Any]:
+def filters_of(bodies: BodyTable) -> tuple[Any, Any, Any, Any]:
     """Columns of the bodies that `keep_checked` reads."""
     return bodies.static, bodies.group, bodies.mask, bodies.id
 
@@ -142,7 +142,7 @@ def _allowed(allowed, id_a, id_b):
     return k < allowed.size and allowed[k] == key
 
 
-class Search(NamedTuple):
+class GridSearch(NamedTuple):
     """A search for partners in the grid."""
 
     which: Any  # (M,) int32: the bodies to find partners for
@@ -184,7 +184,7 @@ def find_partners(bodies, boxes, search, now, margin, pairs):
         prefetch(bodies.motion, np.intp(which[min(k + 1, which.size - 1)]))
         i = which[k]
         swept = swept_box(bodies, i, max(now, bodies.motion[i].covered), margin)
-        overlaps = overlapping(by_cell, swept, found)
+        overlaps = overlapping_boxes(by_cell, swept, found)
         for m in range(overlaps):
             prefetch(bodies.motion, np.intp(found[m]))
         for m in range(overlaps):

@@ -11,7 +11,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.motion.bodies import Bodies
+from collision_monitor.motion.bodies import BodyTable
 
 MOST_PAIRS: Final = 1_000_000
 """Pairs that may meet. Each needs about 560 bytes in the monitor and its answers, and 1 to 20 µs in a step. Larger: a
@@ -19,7 +19,7 @@ crowd of hostile objects fills the memory. Smaller: a real crowd of objects is l
 
 
 def crowded(
-    bodies: Bodies, pairs: NDArray[np.int32], pending: tuple[NDArray[np.void], ...], top: int
+    bodies: BodyTable, pairs: NDArray[np.int32], pending: tuple[NDArray[np.void], ...], top: int
 ) -> NDArray[np.int32]:
     """Return the slots of the bodies to leave out, ascending; none while there are at most MOST_PAIRS pairs.
 

@@ -19,7 +19,7 @@ from collision_monitor._jit import device, inlined, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor.impact.impact_record import BOUND_ONLY, HIT, IMPACT, UNRESOLVED, holds
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
-from collision_monitor.motion.bodies import Bodies
+from collision_monitor.motion.bodies import BodyTable
 from collision_monitor.records import joined
 
 Events = NDArray[np.void]
@@ -213,7 +213,7 @@ class EventList(Stage):
         """The events with `lower` <= time (s): a view."""
         return self.events[: count_until(self.events, time)]
 
-    def first_of_pairs(self, new: Events, bodies: Bodies, active: NDArray[np.void]) -> Events:
+    def first_of_pairs(self, new: Events, bodies: BodyTable, active: NDArray[np.void]) -> Events:
         """Move the events of `new` (IMPACT) that are the first impact of their pair to its front, and return them.
 
         A pair that is predicted further may have an earlier impact among the pending events, or among the active pairs

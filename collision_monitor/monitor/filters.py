@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.motion.bodies import Bodies
+from collision_monitor.motion.bodies import BodyTable
 from collision_monitor.records import Method
 from collision_monitor.settings.setting import EVERYWHERE, Vector
 
@@ -19,7 +19,7 @@ def is_bounded(low: Vector, high: Vector) -> bool:
 
 
 def bodies_in(
-    bodies: Bodies, top: int, now: float, low: Vector, high: Vector, stale_acceleration: float
+    bodies: BodyTable, top: int, now: float, low: Vector, high: Vector, stale_acceleration: float
 ) -> NDArray[np.bool_]:
     """Mask (top,) of the bodies whose bounding spheres may reach into the box from low to high (m) at `now`.
 
@@ -39,7 +39,7 @@ def closes_fast(predictions: NDArray[np.void], least: float) -> NDArray[np.bool_
     return np.asarray(~(predictions["closing_speed"] < least) | (predictions["method"] == Method.BOUND))
 
 
-def approaches(bodies: Bodies, i: NDArray[np.int32], j: NDArray[np.int32], now: float) -> NDArray[np.bool_]:
+def approaches(bodies: BodyTable, i: NDArray[np.int32], j: NDArray[np.int32], now: float) -> NDArray[np.bool_]:
     """Mask of the pairs of bodies i and j (n,) whose origins approach each other, or keep their distance, at `now`."""
     position, velocity = np.zeros((len(i), 3)), np.zeros((len(i), 3))
     for slots, sign in ((i, -1.0), (j, 1.0)):

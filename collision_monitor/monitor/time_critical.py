@@ -24,7 +24,7 @@ from collision_monitor.monitor.first_impacts import FirstImpacts
 from collision_monitor.monitor.state.roster import Roster
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
-from collision_monitor.motion.bodies import Bodies
+from collision_monitor.motion.bodies import BodyTable
 from collision_monitor.records import joined
 from collision_monitor.settings.profile import NO_BUDGET, NO_LIMIT, Profile
 
@@ -271,7 +271,7 @@ def _by_turns(bodies, pairs, events, step, waits, order, turns):
 
 
 def urgency(
-    bodies: Bodies, pairs: NDArray[np.void], events: NDArray[np.void], step: int
+    bodies: BodyTable, pairs: NDArray[np.void], events: NDArray[np.void], step: int
 ) -> tuple[NDArray[np.int64], int]:
     """Return the order in which to examine active pairs, and the number of cheap ones, which come first.
 

@@ -22,7 +22,7 @@ LAST_STATE: Final = np.dtype(
 """The last state of a body: two cache lines, because a contact reads it whole, of bodies in random memory order."""
 
 
-class Bodies(NamedTuple):
+class BodyTable(NamedTuple):
     """N slots of bodies: a structure of arrays, except for the motions and the last states. World frame, SI units."""
 
     used: Any  # (N,) bool: the slot holds a body
@@ -67,7 +67,7 @@ class Multibody(NamedTuple):
 
     table: Any  # geometry.shape_table.ShapeTable
     parts: Parts
-    bodies: Bodies
+    bodies: BodyTable
 
 
 _COLUMNS: Final[dict[str, Any]] = {
@@ -82,11 +82,11 @@ _COLUMNS: Final[dict[str, Any]] = {
 }
 
 
-def make_bodies(capacity: int) -> Bodies:
+def make_bodies(capacity: int) -> BodyTable:
     """Make `capacity` empty slots."""
     columns = columns_in_one_block(capacity, _COLUMNS)
     state = columns.pop("state")
-    bodies = Bodies(**columns, **{name: state[name] for name in state.dtype.names or ()})
+    bodies = BodyTable(**columns, **{name: state[name] for name in state.dtype.names or ()})
     bodies.first_shape[:] = -1
     bodies.motion["covered"] = -np.inf
     return bodies

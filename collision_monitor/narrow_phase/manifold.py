@@ -30,7 +30,7 @@ _ROOM: Final = 8 * CORNERS + 16
 _A, _B, _C, _D = 0, _ROOM, 2 * _ROOM, 3 * _ROOM
 
 
-class View(NamedTuple):
+class Projection(NamedTuple):
     """View along a direction, with two unit vectors perpendicular to it and to each other."""
 
     along: Any
@@ -116,7 +116,7 @@ def _outline(work: Any, at: int, count: int, tie: float) -> int:
 
 
 @device
-def _touching(table: Any, slot: int, R: Any, view: View, tie: float, work: Any, at: int) -> int:
+def _touching(table: Any, slot: int, R: Any, view: Projection, tie: float, work: Any, at: int) -> int:
     """Write the corners within `tie` (m) of the farthest along the view to `at`, as seen; return their number."""
     count = 8 if table.kind[slot] == BOX else int(table.vertex_count[slot])
     farthest = -inf
@@ -274,10 +274,10 @@ def manifold(table: Any, a: int, b: int, pose: PairPose, row: Any, out: Any, wor
     u, v = _basis(n)
     na = nb = 0
     if flat_a:
-        na = _touching(table, a, pose.R_A, View(n, u, v, (0.0, 0.0)), height_tie, work, _A)
+        na = _touching(table, a, pose.R_A, Projection(n, u, v, (0.0, 0.0)), height_tie, work, _A)
         na = _outline(work, _A, na, tie)
     if flat_b:
-        seen = View(opposite(n), u, v, (dot(u, pose.p), dot(v, pose.p)))
+        seen = Projection(opposite(n), u, v, (dot(u, pose.p), dot(v, pose.p)))
         nb = _touching(table, b, pose.R_B, seen, height_tie, work, _B)
         nb = _outline(work, _B, nb, tie)
     at = _B

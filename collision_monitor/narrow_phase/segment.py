@@ -11,7 +11,7 @@ from collision_monitor.tolerances import SEGMENT_PARALLEL_SIN2
 
 
 @inlined
-def clamp(value: float) -> float:
+def clamp_cosine(value: float) -> float:
     """Clamp to -1 ... 1."""
     return min(max(value, -1.0), 1.0)
 
@@ -29,9 +29,9 @@ def segment_segment(u: Vector, v: Vector, p: Vector) -> tuple[float, float]:
     c = dot(u, p)
     f = dot(v, p)
     if not a > 0.0:
-        return 0.0, clamp(-f / e) if e > 0.0 else 0.0
+        return 0.0, clamp_cosine(-f / e) if e > 0.0 else 0.0
     if not e > 0.0:
-        return clamp(c / a), 0.0
+        return clamp_cosine(c / a), 0.0
     # |u x v|^2 from the product itself, because a e - b^2 cancels
     w = cross(u, v)
     cross2 = dot(w, w)
@@ -39,13 +39,13 @@ def segment_segment(u: Vector, v: Vector, p: Vector) -> tuple[float, float]:
         # B covers [c - |b|, c + |b|] / a of A's parameter; take the middle of the overlap, or the nearer end
         low = max(-1.0, (c - abs(b)) / a)
         high = min(1.0, (c + abs(b)) / a)
-        s = clamp(0.5 * (low + high))
+        s = clamp_cosine(0.5 * (low + high))
     else:
         # s of the lines' closest points: (p x v) . (u x v) / |u x v|^2
-        s = clamp(dot(cross(p, v), w) / cross2)
+        s = clamp_cosine(dot(cross(p, v), w) / cross2)
     t = (b * s - f) / e
     if t < -1.0:
-        return clamp((c - b) / a), -1.0
+        return clamp_cosine((c - b) / a), -1.0
     if t > 1.0:
-        return clamp((c + b) / a), 1.0
+        return clamp_cosine((c + b) / a), 1.0
     return s, t

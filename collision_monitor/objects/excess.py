@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.geometry.inside import locate_in_surface
 from collision_monitor.geometry.point_in_polygon import Location
-from collision_monitor.geometry.qhull import Hull
+from collision_monitor.geometry.qhull import QhullResult
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.reach import reach
@@ -49,7 +49,7 @@ PLANES_ROUND_OFF: Final = 1e-6
 count. Smaller: that is not certain, because Qhull merges faces that are nearly coplanar."""
 
 
-def excess_of_large(mesh: Mesh, at: Pose, vertices: Array, model: Shape, pose: Pose, hull: Hull | None) -> float:
+def excess_of_large(mesh: Mesh, at: Pose, vertices: Array, model: Shape, pose: Pose, hull: QhullResult | None) -> float:
     """`excess_of` a concave mesh at a pose, with its vertices (n, 3) in the object's frame.
 
     hull: that of the model, if this is a convex hull with many corners; a cell counts if no plane of it keeps it out.
@@ -68,10 +68,10 @@ def excess_of(shapes: Sequence[tuple[Shape, Pose]], pieces: PosedShapes, model: 
     # the distance to a convex object is greatest at a corner of the model
     if isinstance(model, Sphere):
         return max(float(_distances(pose.position[None], pieces)[0]) + model.radius, 0.0)
-    return max(float(_distances(corners([(model, pose)]), pieces).max()), 0.0)
+    return max(float(_distances(enclosing_points([(model, pose)]), pieces).max()), 0.0)
 
 
-def corners(pieces: PosedShapes) -> Array:
+def enclosing_points(pieces: PosedShapes) -> Array:
     """Points with a hull that contains the pieces: vertices of polytopes, corners of boxes around round shapes."""
     found = []
     for shape, pose in pieces:
@@ -177,7 +177,9 @@ class _DistanceTo:
     @classmethod
     def pieces(cls, pieces: PosedShapes) -> _DistanceTo:
         """Distance from pieces; from their vertices if all are triangles."""
-        return cls(pieces, corners(pieces) if all(isinstance(shape, Triangle) for shape, _ in pieces) else None)
+        return cls(
+            pieces, enclosing_points(pieces) if all(isinstance(shape, Triangle) for shape, _ in pieces) else None
+        )
 
     @classmethod
     def vertices(cls, vertices: Array) -> _DistanceTo:

@@ -16,10 +16,10 @@ from collision_monitor.geometry.bounding_spheres import minimal_sphere
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
 from collision_monitor.geometry.coordinates import coordinates
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
-from collision_monitor.geometry.qhull import Hull
+from collision_monitor.geometry.qhull import QhullResult
 from collision_monitor.objects.closed_parts import separated
 from collision_monitor.objects.convex_decomposition import convex_decomposition
-from collision_monitor.objects.excess import MANY_FACES, PosedShapes, corners, excess_of, excess_of_large
+from collision_monitor.objects.excess import MANY_FACES, PosedShapes, enclosing_points, excess_of, excess_of_large
 from collision_monitor.records import Model
 from collision_monitor.shapes.convex_pieces import convex_pieces, is_concave_mesh
 from collision_monitor.shapes.planar import is_planar
@@ -132,7 +132,7 @@ def _around_large(shapes: Sequence[tuple[Shape, Pose]], model: Model, directions
     assert isinstance(mesh, Mesh)
     vertices = mesh.vertices[np.unique(mesh.faces)] @ at.rotation.T + at.position
     if model is Model.CONVEX_HULL and directions is None:
-        hull = Hull(vertices)
+        hull = QhullResult(vertices)
         solid = ConvexHull(vertices[hull.vertices])
         known = (np.arange(len(hull.vertices), dtype=np.int32),)
         excess = excess_of_large(mesh, at, vertices, solid, Pose(), hull)
@@ -220,7 +220,7 @@ def _enclose(pieces: PosedShapes, model: Model) -> tuple[Shape, Pose]:
         case Model.SPHERE:
             if single and isinstance(shape, Sphere | Box | Capsule | Cylinder | Ellipsoid):
                 return Sphere(float(reach([(shape, Pose())], _widest(shape))) * (1 + ROUNDED_UP)), pose
-            ball = minimal_sphere(corners(pieces))
+            ball = minimal_sphere(enclosing_points(pieces))
             return Sphere(float(ball.radius) * (1 + ROUNDED_UP)), Pose(ball.center)
         case Model.AABB:
             low, high = -reach(pieces, -np.eye(3)), reach(pieces, np.eye(3))
@@ -231,7 +231,7 @@ def _enclose(pieces: PosedShapes, model: Model) -> tuple[Shape, Pose]:
                 return _box(high - low), pose @ Pose((low + high) / 2)
             from scipy.spatial.transform import Rotation
 
-            box = obb_minimum_volume(corners(pieces))
+            box = obb_minimum_volume(enclosing_points(pieces))
             axes = np.array(box.rotation)
             axes[:, 2] *= np.sign(np.linalg.det(axes))
             turned = Rotation.from_matrix(axes).as_quat()
@@ -241,7 +241,7 @@ def _enclose(pieces: PosedShapes, model: Model) -> tuple[Shape, Pose]:
                 if single:
                     return shape, pose
                 raise UnsupportedError("model convex_hull: the hull of several shapes with round ones is not offered")
-            return ConvexHull(corners(pieces)), Pose()
+            return ConvexHull(enclosing_points(pieces)), Pose()
     return _kdop(pieces, np.array(KDOP_DIRECTIONS[KDOPS[model]], float), model.name.lower())
 
 
@@ -301,7 +301,7 @@ def _kdop(pieces: PosedShapes, directions: Array, name: str) -> tuple[Shape, Pos
     if (np.abs(directions[:3]) == np.eye(3)).all():
         centre = (far[:3] - far[k : k + 3]) / 2  # middle of the slabs along x, y and z
     else:
-        centre = corners(pieces).mean(axis=0)
+        centre = enclosing_points(pieces).mean(axis=0)
     distance = far - normals @ centre
     size = float(distance.max())
     if not size > 0.0:

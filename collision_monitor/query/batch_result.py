@@ -30,7 +30,7 @@ class Pairs(NamedTuple):
         return self.shapes_a.of(k), a, self.shapes_b.of(k), b
 
 
-class Batch(Generic[One]):
+class BatchResult(Generic[One]):
     """Base of a frozen dataclass whose public fields are arrays with a row for each pair.
 
     A number selects the result of one pair, as the single call returns it; a slice, a mask or numbers select several.

@@ -115,7 +115,7 @@ def pair_count(**lengths: int) -> int:
     return next(iter(others.values()), 1)
 
 
-def ranges(count: int, progress: Progress | None) -> Iterator[slice]:
+def pair_ranges(count: int, progress: Progress | None) -> Iterator[slice]:
     """The pairs in parts of AT_ONCE; report the number that are done after each."""
     for begin in range(0, count, AT_ONCE):
         end = min(begin + AT_ONCE, count)

@@ -86,7 +86,7 @@ def check_in_plane(side: Posed) -> None:
         raise PoseError(f"expected a turn about z for a shape of the plane, got the quaternion {side.pose.quaternion}")
 
 
-def place(side: Posed) -> tuple[Array, Array]:
+def pose_in_world(side: Posed) -> tuple[Array, Array]:
     """Rotation (3, 3) and position (3,), about the object's origin, of its only shape, in world axes."""
     own = side.outline[0][1]
     if own.quaternion[3] == 1.0 and not own.position.any():

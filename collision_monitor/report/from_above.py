@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from collision_monitor.report.facts import ReportFacts
 from collision_monitor.report.footprint import footprint
 from collision_monitor.report.rendering import INK, PALETTE, Size, shortened
-from collision_monitor.report.tracks import Track
+from collision_monitor.report.tracks import ObjectTrack
 from collision_monitor.session.history.history import CollisionEvent, Floats, History
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ def _middle(history: History, facts: ReportFacts, collision: CollisionEvent) -> 
     return np.asarray(points[0, :2], np.float64)
 
 
-def _line(path: Track, begin: float) -> Floats:
+def _line(path: ObjectTrack, begin: float) -> Floats:
     """Return the positions (n, 3) around a time, with NaN before each jump."""
     near = np.flatnonzero(np.abs(path.time - begin) <= AROUND)
     near = near[:: max(-(-len(near) // POINTS), 1)]

@@ -23,7 +23,7 @@ MOST_TIMES: Final = 800
 
 
 @dataclass(frozen=True, eq=False)
-class Track:
+class ObjectTrack:
     """States of one object: time (n,) s, position (n, 3) m, quaternion (n, 4), linear (n, 3) m/s, angular (n, 3) rad/s.
 
     jump (n,): the object jumped to this state and did not move from the state before. A static object has one state,
@@ -57,20 +57,20 @@ class Tracks:
         self._history = history
         self._order = np.argsort(history.states["id"], kind="stable")
         self._ids = history.states["id"][self._order]
-        self._found: dict[int, Track | None] = {}
+        self._found: dict[int, ObjectTrack | None] = {}
 
-    def __getitem__(self, object_id: int) -> Track | None:
+    def __getitem__(self, object_id: int) -> ObjectTrack | None:
         """Return the track of an object, or None if it has no usable state."""
         if object_id not in self._found:
             self._found[object_id] = self._read(object_id)
         return self._found[object_id]
 
-    def _read(self, object_id: int) -> Track | None:
+    def _read(self, object_id: int) -> ObjectTrack | None:
         described = self._history.objects.get(object_id)
         if described is not None and described.static and described.pose is not None:
             pose, none = described.pose, np.zeros((1, 3))
             always = np.array([-np.inf])
-            return Track(always, pose.position[None], pose.quaternion[None], none, none, np.zeros(1, np.bool_))
+            return ObjectTrack(always, pose.position[None], pose.quaternion[None], none, none, np.zeros(1, np.bool_))
         low, high = np.searchsorted(self._ids, [object_id, object_id + 1])
         mine = self._order[low:high]
         rows, time = self._history.states[mine], self._history.state_time[mine]
@@ -82,7 +82,7 @@ class Tracks:
         rows, time = rows[good], time[good]
         linear, angular = (np.where(np.isfinite(rows[name]), rows[name], 0.0) for name in ("linear", "angular"))
         jump = (rows["flags"] & StateFlag.DISCONTINUITY) != 0
-        return Track(time, rows["position"].copy(), rows["quaternion"].copy(), linear, angular, jump)
+        return ObjectTrack(time, rows["position"].copy(), rows["quaternion"].copy(), linear, angular, jump)
 
     def distance(self, pair: Pair) -> tuple[Floats, Floats] | None:
         """Return times (n,) and signed distances (n,) in m, NaN without a recent state. None if nothing is known."""

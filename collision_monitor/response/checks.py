@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.coordinates import Array, coordinates, numbers
+from collision_monitor.geometry.coordinates import Array, checked_numbers, coordinates
 from collision_monitor.tolerances import LARGEST_INPUT
 
 
@@ -24,7 +24,7 @@ def vectors(*values: tuple[str, ArrayLike]) -> tuple[Array, ...]:
     return tuple(arrays)
 
 
-def direction(value: ArrayLike, name: str = "normal") -> Array:
+def checked_direction(value: ArrayLike, name: str = "normal") -> Array:
     """Vectors (..., 2 or 3) scaled by a power of two to about unit length, which rounds nothing. Raises InputError."""
     array = coordinates(value, name)
     largest = np.abs(array).max(axis=-1, keepdims=True)
@@ -35,13 +35,13 @@ def direction(value: ArrayLike, name: str = "normal") -> Array:
 
 def unit(value: ArrayLike, name: str = "normal") -> Array:
     """Unit vectors (..., 2 or 3). Raises InputError for a zero vector."""
-    scaled = direction(value, name)
+    scaled = checked_direction(value, name)
     return np.asarray(scaled / np.linalg.norm(scaled, axis=-1, keepdims=True))
 
 
 def restitutions(value: ArrayLike) -> Array:
     """Coefficients of restitution (..., 1) from 0 to 1. Raises InputError."""
-    array = numbers(value, "restitution")
+    array = checked_numbers(value, "restitution")
     if not ((array >= 0.0) & (array <= 1.0)).all():
         raise InputError(f"restitution: expected 0 (no bounce) to 1 (elastic), got {value!r:.100}")
     return array[..., None]
@@ -58,6 +58,6 @@ def masses(value: ArrayLike, name: str = "mass") -> Array:
     return array[..., None]
 
 
-def not_negative(value: ArrayLike, name: str) -> Array:
+def checked_not_negative(value: ArrayLike, name: str) -> Array:
     """Finite numbers (...) of at least 0. Raises InputError."""
-    return numbers(value, name, 0.0)
+    return checked_numbers(value, name, 0.0)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from collision_monitor.geometry.coordinates import Array, numbers
-from collision_monitor.response.checks import direction, not_negative, restitutions, unit, vectors
+from collision_monitor.geometry.coordinates import Array, checked_numbers
+from collision_monitor.response.checks import checked_direction, checked_not_negative, restitutions, unit, vectors
 
 
 def normal_part(vector: Array, normal: Array) -> Array:
@@ -23,7 +23,7 @@ def reflect(velocity: ArrayLike, normal: ArrayLike, restitution: ArrayLike = 1.0
     leaves the wall (v.n >= 0) keeps its velocity.
     """
     v, _ = vectors(("velocity", velocity), ("normal", normal))
-    n, e = direction(normal), restitutions(restitution)
+    n, e = checked_direction(normal), restitutions(restitution)
     u = normal_part(v, n)
     approaching = np.sum(v * n, axis=-1, keepdims=True) < 0.0
     return np.where(approaching, v - u - e * u, v)
@@ -54,5 +54,8 @@ def last_free(
 
 def _depth(position: ArrayLike, normal: ArrayLike, offset: ArrayLike, radius: ArrayLike) -> tuple[Array, Array, Array]:
     p, _ = vectors(("position", position), ("normal", normal))
-    n, reach = unit(normal), numbers(offset, "offset")[..., None] + not_negative(radius, "radius")[..., None]
+    n, reach = (
+        unit(normal),
+        checked_numbers(offset, "offset")[..., None] + checked_not_negative(radius, "radius")[..., None],
+    )
     return p, n, np.asarray(reach - np.sum(p * n, axis=-1, keepdims=True))

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.coordinates import Array, numbers
-from collision_monitor.response.checks import not_negative
+from collision_monitor.geometry.coordinates import Array, checked_numbers
+from collision_monitor.response.checks import checked_not_negative
 from collision_monitor.response.contact_set import Bodies, Contacts, solve
 
 
@@ -51,7 +51,11 @@ def hold_contacts(
         raise InputError(f"impulse: expected shape ({count}, 3), one row for each contact, got {start.shape}")
     target, mu, budget = (
         np.broadcast_to(value, count).astype(np.float64)
-        for value in (numbers(opening, "opening"), not_negative(friction, "friction"), not_negative(earlier, "earlier"))
+        for value in (
+            checked_numbers(opening, "opening"),
+            checked_not_negative(friction, "friction"),
+            checked_not_negative(earlier, "earlier"),
+        )
     )
     after, used = solve(bodies, contacts, target, mu, budget, start, iterations, tolerance)
     residual = float((target + contacts.closing(after)).max(initial=0.0))

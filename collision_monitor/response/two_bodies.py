@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.coordinates import Array
-from collision_monitor.response.checks import direction, masses, restitutions, vectors
+from collision_monitor.response.checks import checked_direction, masses, restitutions, vectors
 from collision_monitor.response.planes import normal_part
 
 
@@ -69,7 +69,7 @@ def _approach(
 ) -> tuple[Array, Array, np.ndarray[tuple[int, ...], np.dtype[np.bool_]], Array]:
     """Velocities, whether the bodies approach, and the part of A's velocity relative to B along the normal."""
     va, vb, _ = vectors(("velocity A", velocity_a), ("velocity B", velocity_b), ("normal", normal))
-    n, closing = direction(normal), va - vb
+    n, closing = checked_direction(normal), va - vb
     return va, vb, np.sum(closing * n, axis=-1, keepdims=True) > 0.0, normal_part(closing, n)
 
 

@@ -31,7 +31,7 @@ def link_motions(table: LinkTable, joints: Floats, base: Floats) -> tuple[Floats
     return poses, twists
 
 
-def load() -> None:
+def load_link_motions() -> None:
     """Compile the kernel, or load it from the cache, before messages arrive."""
     one = np.zeros((1, 3)), np.zeros((1, 4)), np.zeros((1, 3))
     row = np.zeros(1, np.int32)

@@ -73,13 +73,17 @@ class RecordedSession:
 
     def check(self, expectations: str | Path | dict[str, Any]) -> None:
         """Assert the expectations of a YAML file or of an equal mapping. A path is relative to the session's file."""
-        from collision_monitor.session.history.expectations import evaluate, parse_expectations, read_expectations
+        from collision_monitor.session.history.expectations import (
+            evaluate_expectations,
+            parse_expectations,
+            read_expectations,
+        )
 
         if isinstance(expectations, dict):
             expected = parse_expectations(expectations)
         else:
             expected = parse_expectations(read_expectations(self.path.parent / expectations))
-        failed = [each for each in evaluate(expected, self.history, self.replay) if not each.holds]
+        failed = [each for each in evaluate_expectations(expected, self.history, self.replay) if not each.holds]
         assert not failed, "\n".join([str(self.path), *(f"  {each.expectation}: {each.found}" for each in failed)])
 
 

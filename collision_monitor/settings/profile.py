@@ -22,10 +22,10 @@ from collision_monitor.settings.setting import (
     Setting,
     by_name,
     choice,
-    number,
+    number_setting,
     settings_of,
     switch,
-    vector,
+    vector_setting,
 )
 
 NO_BUDGET: Final = 1e6
@@ -52,7 +52,7 @@ class Profile:
     """
 
     name: str = "balanced"
-    horizon: float = number(
+    horizon: float = number_setting(
         2.0,
         0.0,
         1e6,
@@ -73,8 +73,10 @@ class Profile:
         "Hz",
         "Largest rate at which states of classes of objects are used, such as 'pallet*=2'. The others are left out.",
     )
-    contact_margin: float = number(0.0, 0.0, 1e6, "m", "Gap up to which a pair counts as touching.", predictions=True)
-    contact_points: int = number(
+    contact_margin: float = number_setting(
+        0.0, 0.0, 1e6, "m", "Gap up to which a pair counts as touching.", predictions=True
+    )
+    contact_points: int = number_setting(
         1,
         1,
         MOST_POINTS,
@@ -85,14 +87,14 @@ class Profile:
         True,
         "Whether to compute witness points, features and closing speeds of contacts. Without, they are NaN or UNKNOWN.",
     )
-    distance_tolerance: float = number(
+    distance_tolerance: float = number_setting(
         0.0,
         0.0,
         1.0,
         "m",
         "Largest error of the distance of meshes that overlap, and of a contact that is not computed anew. 0: none.",
     )
-    impact_tolerance: float = number(
+    impact_tolerance: float = number_setting(
         1e-4,
         1e-12,
         1.0,
@@ -100,7 +102,7 @@ class Profile:
         "Largest gap that may remain at a predicted impact. A smaller one gives tighter times and takes longer.",
         predictions=True,
     )
-    mesh_impact_tolerance: float = number(
+    mesh_impact_tolerance: float = number_setting(
         0.0,
         0.0,
         1e3,
@@ -108,7 +110,7 @@ class Profile:
         "Gap up to which a predicted impact of a mesh is only bounded, until it is due. With 0, impact_tolerance.",
         predictions=True,
     )
-    impact_iterations: int = number(
+    impact_iterations: int = number_setting(
         64,
         1,
         100000,
@@ -116,7 +118,7 @@ class Profile:
         "Largest number of distance computations for one predicted impact. A pair that needs more is UNRESOLVED.",
         predictions=True,
     )
-    position_tolerance: float = number(
+    position_tolerance: float = number_setting(
         1e-3,
         0.0,
         1e3,
@@ -124,7 +126,7 @@ class Profile:
         "Largest distance from its predicted position at which an object keeps its predictions.",
         predictions=True,
     )
-    orientation_tolerance: float = number(
+    orientation_tolerance: float = number_setting(
         1e-3,
         0.0,
         math.pi,
@@ -132,7 +134,7 @@ class Profile:
         "Largest angle from its predicted orientation at which an object keeps its predictions.",
         predictions=True,
     )
-    velocity_tolerance: float = number(
+    velocity_tolerance: float = number_setting(
         1e-3,
         0.0,
         1e3,
@@ -140,7 +142,7 @@ class Profile:
         "Largest difference from its predicted linear velocity at which an object keeps its predictions.",
         predictions=True,
     )
-    angular_velocity_tolerance: float = number(
+    angular_velocity_tolerance: float = number_setting(
         1e-3,
         0.0,
         1e3,
@@ -153,14 +155,14 @@ class Profile:
         "Whether the tolerances of an object follow how far it leaves its motion; the set ones are then the widest.",
         predictions=True,
     )
-    stale_after: float = number(
+    stale_after: float = number_setting(
         0.5,
         0.0,
         1e6,
         "s",
         "Age of the last state of an object beyond which it is stale and its predictions are flagged.",
     )
-    stale_acceleration: float = number(
+    stale_acceleration: float = number_setting(
         1.0,
         0.0,
         1e4,
@@ -170,10 +172,10 @@ class Profile:
     uncertainty: bool = switch(
         True, "Whether to compute when and how likely pairs meet, if states declare an uncertainty.", predictions=True
     )
-    uncertainty_samples: int = number(
+    uncertainty_samples: int = number_setting(
         1024, 16, 4096, "1", "Number of samples of the declared uncertainty for each pair that may meet."
     )
-    confidence: float = number(
+    confidence: float = number_setting(
         0.95,
         0.5,
         0.9999,
@@ -181,7 +183,7 @@ class Profile:
         "Confidence level of the earliest and latest time of a collision, if states declare an uncertainty.",
         predictions=True,
     )
-    min_probability: float = number(
+    min_probability: float = number_setting(
         0.01,
         1e-6,
         1.0,
@@ -189,22 +191,24 @@ class Profile:
         "Smallest probability at which a pair is reported that may meet only because of its uncertainty.",
         predictions=True,
     )
-    max_time_step: float = number(
+    max_time_step: float = number_setting(
         10.0,
         1e-3,
         1e9,
         "s",
         "Largest jump of a stamp. A stamp that jumps further is refused unless the next message confirms it.",
     )
-    threads: int = number(1, 1, 64, "1", "Number of threads of a step. The answers are the same bytes for any number.")
-    budget_ms: float = number(
+    threads: int = number_setting(
+        1, 1, 64, "1", "Number of threads of a step. The answers are the same bytes for any number."
+    )
+    budget_ms: float = number_setting(
         NO_BUDGET,
         0.05,
         NO_BUDGET,
         "ms",
         "Time that a step may take. The most urgent pairs come first, and the others are UNRESOLVED.",
     )
-    pairs_per_step: int = number(
+    pairs_per_step: int = number_setting(
         NO_LIMIT,
         1,
         NO_LIMIT,
@@ -222,26 +226,26 @@ class Profile:
     model_compound: str = choice(
         _MODELS, "Model that represents objects of several shapes, if their description chooses none."
     )
-    model_error: float = number(
+    model_error: float = number_setting(
         1e6,
         0.0,
         1e6,
         "m",
         "Largest distance by which a model that these settings choose may exceed its object, which else is exact.",
     )
-    region_min: tuple[float, float, float] = vector(
+    region_min: tuple[float, float, float] = vector_setting(
         (-EVERYWHERE, -EVERYWHERE, -EVERYWHERE),
         EVERYWHERE,
         "m",
         "Lower corner of the region of interest. Objects that are wholly outside the region are ignored.",
     )
-    region_max: tuple[float, float, float] = vector(
+    region_max: tuple[float, float, float] = vector_setting(
         (EVERYWHERE, EVERYWHERE, EVERYWHERE),
         EVERYWHERE,
         "m",
         "Upper corner of the region of interest. Objects that are wholly outside the region are ignored.",
     )
-    min_closing_speed: float = number(
+    min_closing_speed: float = number_setting(
         0.0,
         0.0,
         1e6,

@@ -24,7 +24,7 @@ _KINDS: dict[type, str] = {bool: "true or false", int: "a whole number", float: 
 _UNITS = {"s": "seconds", "ms": "milliseconds", "m": "metres", "rad": "radians"}
 
 
-def number(
+def number_setting(
     default: float | int,
     minimum: float | int,
     maximum: float | int,
@@ -38,7 +38,7 @@ def number(
     return field(default=default, metadata={**metadata, "predictions": predictions})
 
 
-def vector(default: Vector, largest: float, unit: str, description: str) -> Any:
+def vector_setting(default: Vector, largest: float, unit: str, description: str) -> Any:
     """Return a field of a profile: x, y and z, each from -largest to largest."""
     metadata = {"minimum": -largest, "maximum": largest, "unit": unit, "description": description}
     return field(default=default, metadata=metadata)

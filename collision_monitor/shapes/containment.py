@@ -10,7 +10,7 @@ from collision_monitor.errors import UnsupportedError
 from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.coordinates import Array, Booleans
 from collision_monitor.geometry.inside import locate_in_surface
-from collision_monitor.geometry.point_in_polygon import Location, locate, locate_in_convex
+from collision_monitor.geometry.point_in_polygon import Location, locate_in_convex, locate_in_polygon
 from collision_monitor.geometry.points import closest_point_on_segment
 from collision_monitor.geometry.polygons import is_convex
 from collision_monitor.geometry.polyhedra import locate_in_convex_polyhedron, locate_in_polyhedron
@@ -42,7 +42,7 @@ def inside(shape: Shape, p: Array, test: str) -> Booleans:
         case Polygon() if shape.radius > 0.0:
             raise UnsupportedError(f"test {test}: Polygon with a radius is not offered; use the test 'closed form'")
         case Polygon() if ray:
-            return np.asarray(locate(p[:, :2], shape.points)) != Location.OUTSIDE
+            return np.asarray(locate_in_polygon(p[:, :2], shape.points)) != Location.OUTSIDE
         case Polygon() if is_convex(shape.points):
             return np.asarray(locate_in_convex(p[:, :2], shape.points)) != Location.OUTSIDE
         case Box() | ConvexHull():
@@ -109,4 +109,4 @@ def _in_rounded_polygon(shape: Polygon, p: Array) -> Booleans:
     near = (np.hypot(*np.moveaxis(at - p[:, None], -1, 0)) <= shape.radius).any(axis=1)
     if len(start) == 2:
         return np.asarray(near)
-    return np.asarray(near | (np.asarray(locate(p, start)) != Location.OUTSIDE))
+    return np.asarray(near | (np.asarray(locate_in_polygon(p, start)) != Location.OUTSIDE))

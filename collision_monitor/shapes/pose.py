@@ -18,7 +18,7 @@ from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 Array = NDArray[np.float64]
 
 
-def vector(value: ArrayLike, name: str, length: int = 3) -> Array:
+def checked_vector(value: ArrayLike, name: str, length: int = 3) -> Array:
     """Check a vector of `length` finite numbers; return it as float64, read-only. Raises PoseError."""
     try:
         result = np.array(value, dtype=np.float64)
@@ -41,7 +41,7 @@ def _advice(shape: tuple[int, ...]) -> str:
 
 def unit_quaternion(value: ArrayLike) -> Array:
     """Normalise a quaternion (x, y, z, w) within 1e-3 of unit length. Raises PoseError beyond."""
-    q = vector(value, "quaternion", 4)
+    q = checked_vector(value, "quaternion", 4)
     norm = float(np.linalg.norm(q))
     if abs(norm - 1.0) > UNIT_QUATERNION:
         raise PoseError(
@@ -106,7 +106,7 @@ class Pose:
         return super().__new__(cls)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "position", vector(self.position, "position"))
+        object.__setattr__(self, "position", checked_vector(self.position, "position"))
         object.__setattr__(self, "quaternion", unit_quaternion(self.quaternion))
 
     @classmethod
@@ -148,7 +148,7 @@ class Pose:
         >>> Pose.from_euler(0, 0, 90, degrees=True).rotation.round(3)[:, 0]
         array([0., 1., 0.])
         """
-        angles = vector((roll, pitch, yaw), "roll, pitch, yaw")
+        angles = checked_vector((roll, pitch, yaw), "roll, pitch, yaw")
         x, y, z = from_rotation_vector(np.diag(np.radians(angles) if degrees else angles))
         return cls(position, multiply(z, multiply(y, x)))
 
@@ -159,7 +159,7 @@ class Pose:
         >>> Pose.from_wxyz((1, 2, 3), (1, 0, 0, 0)).quaternion
         array([0., 0., 0., 1.])
         """
-        w, x, y, z = vector(quaternion, "quaternion w, x, y, z", 4)
+        w, x, y, z = checked_vector(quaternion, "quaternion w, x, y, z", 4)
         return cls(position, (x, y, z, w))
 
     @property
@@ -209,9 +209,9 @@ class Motion:
         if not isinstance(self.pose, Pose):
             got = type(self.pose).__name__
             raise PoseError(f"Motion: expected a Pose first, got {got}; write Motion(Pose((x, y, z)), linear)")
-        object.__setattr__(self, "linear", vector(self.linear, "linear velocity"))
-        object.__setattr__(self, "angular", vector(self.angular, "angular velocity"))
-        object.__setattr__(self, "acceleration", vector(self.acceleration, "acceleration"))
+        object.__setattr__(self, "linear", checked_vector(self.linear, "linear velocity"))
+        object.__setattr__(self, "angular", checked_vector(self.angular, "angular velocity"))
+        object.__setattr__(self, "acceleration", checked_vector(self.acceleration, "acceleration"))
 
     def at(self, time: float) -> Pose:
         """The pose after `time` seconds at constant angular velocity and acceleration."""

@@ -35,7 +35,7 @@ AT_ONCE: Final = 1 << 20
 """Pairs of a ray and an edge or a face in one batch, which limits the temporary arrays to 200 MB."""
 
 
-class Interval(NamedTuple):
+class RayInterval(NamedTuple):
     """Part of each ray in a convex solid: t from enter (...) to leave (...); empty if enter > leave."""
 
     enter: Array
@@ -65,7 +65,7 @@ def first_hits(shape: Shape, p: Array, d: Array) -> tuple[Array, Array]:
     return best, normals
 
 
-def _solids(shape: Shape, p: Array, d: Array) -> list[Interval]:
+def _solids(shape: Shape, p: Array, d: Array) -> list[RayInterval]:
     """Intervals of convex solids that make up the shape."""
     match shape:
         case Sphere():
@@ -104,16 +104,16 @@ def _check_in_plane(d: Array) -> None:
         raise InputError("direction: expected one in the x-y plane for a Circle or a Polygon, got one out of it")
 
 
-def _ball(p: Array, d: Array, radius: float) -> Interval:
+def _ball(p: Array, d: Array, radius: float) -> RayInterval:
     middle = -_dot(p, d)
     across = p + middle[..., None] * d  # the ray's point nearest to the centre: its square does not cancel
     rest = radius * radius - _dot(across, across)
     half = np.sqrt(np.maximum(rest, 0.0))
     enter = np.where(rest >= 0.0, middle - half, np.inf)
-    return Interval(enter, np.where(rest >= 0.0, middle + half, -np.inf), (across - half[..., None] * d) / radius)
+    return RayInterval(enter, np.where(rest >= 0.0, middle + half, -np.inf), (across - half[..., None] * d) / radius)
 
 
-def _ellipsoid(p: Array, d: Array, radii: Array) -> Interval:
+def _ellipsoid(p: Array, d: Array, radii: Array) -> RayInterval:
     """In coordinates in which it is a ball, and from the ray's point nearest to its centre, which keeps digits."""
     near = -_dot(p, d)
     least = radii.min()
@@ -127,10 +127,10 @@ def _ellipsoid(p: Array, d: Array, radii: Array) -> Interval:
     length = np.linalg.norm(normal, axis=1, keepdims=True)
     enter = np.where(rest >= 0.0, near + middle - half, np.inf)
     leave = np.where(rest >= 0.0, near + middle + half, -np.inf)
-    return Interval(enter, leave, normal / np.where(length > 0.0, length, 1.0))
+    return RayInterval(enter, leave, normal / np.where(length > 0.0, length, 1.0))
 
 
-def _planes(normal: Array, offset: Array, p: Array, d: Array) -> Interval:
+def _planes(normal: Array, offset: Array, p: Array, d: Array) -> RayInterval:
     """Intersection of half-spaces {x : n.x <= offset}."""
     height, speed = p @ normal.T - offset, d @ normal.T
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -138,10 +138,10 @@ def _planes(normal: Array, offset: Array, p: Array, d: Array) -> Interval:
     enter = np.where(speed < 0.0, t, np.where((speed == 0.0) & (height > 0.0), np.inf, -np.inf))
     leave = np.where(speed > 0.0, t, np.inf)
     which = enter.argmax(axis=1)
-    return Interval(enter.max(axis=1), leave.min(axis=1), normal[which])
+    return RayInterval(enter.max(axis=1), leave.min(axis=1), normal[which])
 
 
-def _tube(p: Array, d: Array, radius: float) -> Interval:
+def _tube(p: Array, d: Array, radius: float) -> RayInterval:
     """An infinite cylinder about z."""
     u, w = d * [1.0, 1.0, 0.0], p * [1.0, 1.0, 0.0]
     square = _dot(u, u)
@@ -153,21 +153,21 @@ def _tube(p: Array, d: Array, radius: float) -> Interval:
     half = np.where(along, np.inf, np.sqrt(np.maximum(rest, 0.0) / scale))
     enter, leave = np.where(rest >= 0.0, middle - half, np.inf), np.where(rest >= 0.0, middle + half, -np.inf)
     finite = np.where(np.isfinite(half), half, 0.0)
-    return Interval(enter, leave, (across - finite[:, None] * u) / radius)
+    return RayInterval(enter, leave, (across - finite[:, None] * u) / radius)
 
 
-def _caps(p: Array, d: Array, half: float) -> Interval:
+def _caps(p: Array, d: Array, half: float) -> RayInterval:
     """The slab |z| <= half."""
     axis = np.array([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]])
     return _planes(axis, np.full(2, half), p, d)
 
 
-def _common(a: Interval, b: Interval) -> Interval:
+def _common(a: RayInterval, b: RayInterval) -> RayInterval:
     later = (a.enter >= b.enter)[:, None]
-    return Interval(np.maximum(a.enter, b.enter), np.minimum(a.leave, b.leave), np.where(later, a.normal, b.normal))
+    return RayInterval(np.maximum(a.enter, b.enter), np.minimum(a.leave, b.leave), np.where(later, a.normal, b.normal))
 
 
-def _cone(shape: Cone, p: Array, d: Array) -> Interval:
+def _cone(shape: Cone, p: Array, d: Array) -> RayInterval:
     """Between base and apex, the points with f = x² + y² - (s (apex - z))² <= 0, where f is a quadratic of t."""
     slope, apex = shape.radius / shape.length, shape.length / 2
     slab = _caps(p, d, apex)
@@ -194,7 +194,7 @@ def _cone(shape: Cone, p: Array, d: Array) -> Interval:
     side[:, 2] = slope * np.hypot(at[:, 0], at[:, 1])
     length = np.linalg.norm(side, axis=1, keepdims=True)
     on_base = (enter <= slab.enter)[:, None]
-    return Interval(enter, leave, np.where(on_base, slab.normal, side / np.where(length > 0.0, length, 1.0)))
+    return RayInterval(enter, leave, np.where(on_base, slab.normal, side / np.where(length > 0.0, length, 1.0)))
 
 
 def _polygon_hits(shape: Polygon, p: Array, d: Array) -> tuple[Array, Array]:

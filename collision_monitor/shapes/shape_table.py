@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from collision_monitor._jit import device
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import InputError, ShapeError, UnsupportedError
-from collision_monitor.geometry.polygons import corners, is_convex, is_counter_clockwise
+from collision_monitor.geometry.polygons import is_convex, is_counter_clockwise, polygon_corners
 from collision_monitor.geometry.qhull import hull_vertices
 from collision_monitor.records import ShapeType
 from collision_monitor.shapes import shapes
@@ -136,7 +136,7 @@ def convex_ring(points: Array) -> NDArray[np.int32]:
         return np.arange(2, dtype=np.int32)
     if not is_convex(points):
         raise ShapeError("Polygon points: expected a convex polygon, got a concave one; see triangulation.convex_parts")
-    ring = corners(points)
+    ring = polygon_corners(points)
     return (ring if is_counter_clockwise(points) else ring[::-1]).astype(np.int32)
 
 

@@ -17,7 +17,7 @@ from collision_monitor.pipeline.topics import Topic
 from collision_monitor.sources.ground.frames import frame_name
 from collision_monitor.sources.ground.mapping import HEADER, Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
-from collision_monitor.sources.ground.scene import Scene
+from collision_monitor.sources.ground.scene import SourceScene
 from collision_monitor.sources.ground.source import RawMessage, Source
 from collision_monitor.sources.ground.waiting_states import Step
 from collision_monitor.sources.kinds import BY_TYPE, SECTIONS
@@ -56,7 +56,7 @@ class Feed:
 
     def __init__(self, mapping: Mapping, decode: Decode) -> None:
         self.mapping = mapping
-        self.scene = Scene(
+        self.scene = SourceScene(
             mapping.frame,
             mapping.max_age,
             first_free_id=1 + max((entry.object_id for entry in mapping.sources), default=0),

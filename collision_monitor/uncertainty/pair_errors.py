@@ -6,7 +6,7 @@ from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.uncertainty.samples.error_samples import LEFT_OVER, ORIENTATION, add_covariance, turns
+from collision_monitor.uncertainty.samples.error_samples import LEFT_OVER, ORIENTATION, add_covariance, errors_turn
 from collision_monitor.uncertainty.samples.normal_samples import DIMENSIONS
 from collision_monitor.uncertainty.samples.sample_gaps import FIRST_ORDER, NOT_TURNED, SERIES
 from collision_monitor.uncertainty.spread import unknown_acceleration
@@ -136,7 +136,7 @@ def coordinates_in_use(errors):
     one, other = errors.turning
     if one[3] > 0.0 or other[3] > 0.0:
         return DIMENSIONS
-    return LEFT_OVER if turns(one) or turns(other) else ORIENTATION
+    return LEFT_OVER if errors_turn(one) or errors_turn(other) else ORIENTATION
 
 
 @inlined

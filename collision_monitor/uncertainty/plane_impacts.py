@@ -97,7 +97,7 @@ TOO_FAST: Final = -1
 """Number of samples of bodies that turn too fast for planes, or need too many, or finer numbers."""
 
 
-class Search(NamedTuple):
+class PlaneSearch(NamedTuple):
     """Samples for which planes are sought."""
 
     points: Any  # (DIMENSIONS, S): see normal_samples.SampleColumns
@@ -254,7 +254,7 @@ def enter_bodies(multibody, i, j, errors, sampling, columns, memory, work):
     set_errors(work.joint, work.frame, errors.time, points, 0, pilot, memory.off)
     for n in range(times.size):
         times[n] = inf
-    search = Search(points, pilot, columns.extremes, VERIFIED_IN_PILOT, TURNED_FACETS, BENDING)
+    search = PlaneSearch(points, pilot, columns.extremes, VERIFIED_IN_PILOT, TURNED_FACETS, BENDING)
     a, b = first_a, first_b
     pair = ShapePair(A, B, a, b)
     laid = _lay_planes(table, parts, pair, errors, search, end, sampling, memory, work)
@@ -312,7 +312,7 @@ def enter_surely(multibody, i, j, errors, sampling, columns, memory, work):
         pair = ShapePair(work.motion[0], work.motion[1], a, b)
         until = min(errors.time, latest(times, samples))
         bending = SURE_BENDING if is_linear(table, a) and is_linear(table, b) else CORNER_BENDING
-        search = Search(points, samples, extremes, VERIFIED_IN_PILOT, FACETS_IN_PILOT, bending)
+        search = PlaneSearch(points, samples, extremes, VERIFIED_IN_PILOT, FACETS_IN_PILOT, bending)
         if not _lay_planes(table, parts, pair, errors, search, until, sampling, memory, work).complete:
             return TOO_FAST
         _lower(times, memory.alone, samples)

@@ -17,7 +17,7 @@ from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.vector import cross, dot
 from collision_monitor.shapes.shape_table import CYLINDER, SPHERE
 from collision_monitor.uncertainty.pair_errors import spin_rate, turned_at
-from collision_monitor.uncertainty.samples.error_samples import LEFT_OVER, ORIENTATION, turns
+from collision_monitor.uncertainty.samples.error_samples import LEFT_OVER, ORIENTATION, errors_turn
 from collision_monitor.uncertainty.samples.normal_samples import FURTHEST
 from collision_monitor.uncertainty.samples.sample_count import samples_needed
 from collision_monitor.uncertainty.samples.straight_samples import (
@@ -70,14 +70,16 @@ def round_form(table, parts, pair, errors, margin, work):
     A, B, a, b = pair
     if parts.next[a] >= 0 or parts.next[b] >= 0 or half_acceleration(A, B) > 0.0:
         return NOT_ROUND
-    is_off = errors.bend > 0.0 or turns(errors.turning[0]) or turns(errors.turning[1])
+    is_off = errors.bend > 0.0 or errors_turn(errors.turning[0]) or errors_turn(errors.turning[1])
     if table.kind[a] == SPHERE and table.kind[b] == SPHERE:
         return NOT_ROUND if is_off else ROUND
     if not (table.kind[a] == table.kind[b] == CYLINDER) or table.margin[a] + table.margin[b] + margin > 0.0:
         return NOT_ROUND
     R = work.scratch.rotation
     oa, ob = place_shape(table, parts, a, A.rotation, R[0]), place_shape(table, parts, b, B.rotation, R[1])
-    by_yaw = (errors.yaw_only[0] and turns(errors.turning[0])) or (errors.yaw_only[1] and turns(errors.turning[1]))
+    by_yaw = (errors.yaw_only[0] and errors_turn(errors.turning[0])) or (
+        errors.yaw_only[1] and errors_turn(errors.turning[1])
+    )
     if by_yaw:
         return NOT_ROUND
     if not is_off and is_parallel(table, a, PairPose(R[0], R[1], (0.0, 0.0, 0.0))):

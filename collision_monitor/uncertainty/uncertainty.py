@@ -38,13 +38,13 @@ from collision_monitor.uncertainty.samples.error_samples import (
     LEFT_OVER,
     ORIENTATION,
     add_covariance,
+    errors_turn,
     orientation_spread,
     set_frame,
     set_turn,
     shift,
     take_root,
     turn,
-    turns,
 )
 from collision_monitor.uncertainty.samples.foretold_samples import (
     OPEN,
@@ -267,7 +267,7 @@ def _least_tolerance(multibody, i, j, turning, t, margin, work):
     variance = (L[0, 0] - t * L[3, 0]) ** 2 + t * t * (L[3, 1] ** 2 + L[3, 2] ** 2 + L[3, 3] ** 2)
     for side in range(2):
         off, radius = turning[side], bodies.spin_radius[i if side == 0 else j]
-        if turns(off):
+        if errors_turn(off):
             variance += (radius * radius) * (off[0] * off[0] + off[2] * off[2])
     return max(NEAR * gap, 2.0 * SAMPLE_TOLERANCE * sqrt(variance))
 
@@ -459,7 +459,7 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
         take_root(work.joint)
         turn_i = orientation_spread(spread, i, r_i, age_i, t, right)
         turn_j = orientation_spread(spread, j, r_j, age_j, t, right)
-        turns_i, turns_j = turns(turn_i), turns(turn_j)
+        turns_i, turns_j = errors_turn(turn_i), errors_turn(turn_j)
         for r in range(3):
             for c in range(3):
                 work.rotation[0, r, c] = A.rotation[r, c]

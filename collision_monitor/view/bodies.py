@@ -48,7 +48,7 @@ class Pieces:
         return position + turned, multiply(quaternion, self.quaternion[piece])
 
 
-class Bodies:
+class DescribedBodies:
     """Described objects (n,), ascending by id: ids (n,), static (n,), reach (n,) m, and their pieces by form's name.
 
     pieces_by_id: as of `described_pieces`. The reach is the radius about an object's origin of a ball that contains it,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from collision_monitor import records
 from collision_monitor.records import StateFlag
 from collision_monitor.shapes.pose import from_rotation_vector, multiply
-from collision_monitor.view.bodies import Bodies, Floats, Indices
+from collision_monitor.view.bodies import DescribedBodies, Floats, Indices
 from collision_monitor.view.levels import Level, Pair
 
 
@@ -25,7 +25,7 @@ class Moment:
     is_known: whether there are answers; without them, nothing may be shown as clear.
     """
 
-    bodies: Bodies
+    bodies: DescribedBodies
     body: Indices
     state: NDArray[np.void]
     age: Floats

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.view.levels import COLORS, Level
-from collision_monitor.view.picture import Batch, Picture, Role
+from collision_monitor.view.picture import InstanceBatch, Picture, Role
 
 if TYPE_CHECKING:
     import viser
@@ -70,7 +70,7 @@ class Page:
             self._batches.pop(key).remove()
             del self._ids[key]
 
-    def _show_batch(self, key: tuple[Role, str], batch: Batch) -> None:
+    def _show_batch(self, key: tuple[Role, str], batch: InstanceBatch) -> None:
         role, name = key
         self._ids[key] = batch.ids
         visible = role.value not in self.hidden

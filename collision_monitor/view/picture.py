@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.records import Phase, PredictionStatus
 from collision_monitor.shapes.pose import rotation_matrix
-from collision_monitor.view.bodies import Bodies, Floats, Indices
+from collision_monitor.view.bodies import DescribedBodies, Floats, Indices
 from collision_monitor.view.forms import PLANE, Form
 from collision_monitor.view.labels import Label, labels
 from collision_monitor.view.levels import COLORS, Level, object_levels, prediction_levels
@@ -41,7 +41,7 @@ class Role(Enum):
     IMPACT = "impact"
 
 
-class Batch(NamedTuple):
+class InstanceBatch(NamedTuple):
     """Copies of one form: position (n, 3) m, wxyz (n, 4), scale (n, 3) m, color (n, 3); ids (n,) of their objects."""
 
     form: Form
@@ -63,7 +63,7 @@ class Picture:
     """
 
     origin: Floats
-    batches: dict[tuple[Role, str], Batch]
+    batches: dict[tuple[Role, str], InstanceBatch]
     clouds: Singles
     cloud_colors: Bytes
     cloud_diameter: float
@@ -156,9 +156,9 @@ def _unit(moment: Moment) -> float:
 
 def _batches(
     moment: Moment, position: Floats, quaternion: Floats, levels: Bytes, extent: float
-) -> dict[tuple[Role, str], Batch]:
+) -> dict[tuple[Role, str], InstanceBatch]:
     static = moment.bodies.static[moment.body]
-    found: dict[tuple[Role, str], Batch] = {}
+    found: dict[tuple[Role, str], InstanceBatch] = {}
     for role, rows in ((Role.MOVING, np.flatnonzero(~static)), (Role.STATIC, np.flatnonzero(static))):
         placed = _placed(moment, rows, position[rows], quaternion[rows], COLORS[levels[rows]], extent)
         found |= {(role, name): batch for name, batch in placed.items()}
@@ -167,10 +167,10 @@ def _batches(
 
 def _placed(
     moment: Moment, rows: Indices, position: Floats, quaternion: Floats, color: Bytes, extent: float = 1.0
-) -> dict[str, Batch]:
+) -> dict[str, InstanceBatch]:
     """Return the batches of objects (k,) at these poses, by form."""
     found = {}
-    bodies: Bodies = moment.bodies
+    bodies: DescribedBodies = moment.bodies
     for name, pieces in bodies.pieces.items():
         piece, which = pieces.of(moment.body[rows])
         if len(piece):
@@ -179,11 +179,11 @@ def _placed(
             wxyz = turned[:, [3, 0, 1, 2]]
             ids = moment.ids[rows[which]]
             placed: list[Singles] = [each.astype(np.float32) for each in (at, wxyz, scale)]
-            found[name] = Batch(pieces.form, placed[0], placed[1], placed[2], color[which], ids)
+            found[name] = InstanceBatch(pieces.form, placed[0], placed[1], placed[2], color[which], ids)
     return found
 
 
-def _clouds(batches: dict[tuple[Role, str], Batch]) -> tuple[Singles, Bytes, float]:
+def _clouds(batches: dict[tuple[Role, str], InstanceBatch]) -> tuple[Singles, Bytes, float]:
     """Return the points (n, 3) of all clouds at their poses, their colours (n, 3) and their largest diameter (m).
 
     They are drawn together, because a scan has other points each time. Clouds in poses of impact are left out.
@@ -199,7 +199,7 @@ def _clouds(batches: dict[tuple[Role, str], Batch]) -> tuple[Singles, Bytes, flo
     return np.concatenate(points).astype(np.float32), np.concatenate(colors), diameter
 
 
-def _impact_batches(moment: Moment, shown: NDArray[np.void], origin: Floats) -> dict[tuple[Role, str], Batch]:
+def _impact_batches(moment: Moment, shown: NDArray[np.void], origin: Floats) -> dict[tuple[Role, str], InstanceBatch]:
     """Return both objects of each certain collision at the time of impact. Only those have a pose of impact."""
     certain = shown[(shown["status"] == PredictionStatus.HIT) & np.isfinite(shown["lower"])]
     rows = moment.rows_of(np.concatenate([certain["id_a"], certain["id_b"]]))

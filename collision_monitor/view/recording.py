@@ -26,7 +26,7 @@ from collision_monitor.session.reader import Recorded, Session
 from collision_monitor.settings.profile import Profile
 from collision_monitor.view.levels import Pair
 from collision_monitor.view.moment import Moment
-from collision_monitor.view.scene import Scene
+from collision_monitor.view.scene import TopicContent
 
 APART: Final = 64
 """Steps between two kept scenes. A moment needs at most so many steps from the kept scene before it."""
@@ -65,7 +65,7 @@ class Recording:
         messages = session.messages() if replay_with is None else _answered(session, replay_with)
         self.times = self._read(messages, progress)
         self.problems += session.damage
-        self._kept = [Scene(session.frame_id, has_rules=bool(session.rules.text))]
+        self._kept = [TopicContent(session.frame_id, has_rules=bool(session.rules.text))]
         self._scene, self._frame = self._kept[0].copy(), -1
 
     def _read(self, messages: Iterator[Recorded], progress: Callable[[], None]) -> list[float]:

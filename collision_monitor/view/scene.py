@@ -36,7 +36,7 @@ from collision_monitor.records import StateFlag
 from collision_monitor.shapes.pose import multiply
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 from collision_monitor.uncertainty.spread import worst_stddevs
-from collision_monitor.view.bodies import Bodies, described_pieces
+from collision_monitor.view.bodies import DescribedBodies, described_pieces
 from collision_monitor.view.forms import Piece
 from collision_monitor.view.levels import Level, Pair
 from collision_monitor.view.moment import Moment
@@ -49,7 +49,7 @@ _ALERTS_LAST: Final = 1_500_000_000
 _NEVER: Final = np.iinfo(np.int64).min
 
 
-class Scene:
+class TopicContent:
     """The newest content of a monitor's topics, live or from a session.
 
     frame_id: states and descriptions in another frame are ignored, as the monitor refuses them; empty: not known yet,
@@ -65,7 +65,7 @@ class Scene:
         self._catalogue = Catalogue()
         self._is_shared = False
         self._pieces: dict[int, list[Piece]] = {}
-        self._bodies = Bodies()
+        self._bodies = DescribedBodies()
         self._removed: set[int] = set()
         self._is_changed = False
         self._state = np.zeros(0, records.STATE)
@@ -101,7 +101,7 @@ class Scene:
             case "MonitorStatus":
                 self.status = decode_status(data)
 
-    def copy(self) -> Scene:
+    def copy(self) -> TopicContent:
         """Return a scene that takes further messages without changing this one."""
         self._is_shared = True
         other = copy.copy(self)
@@ -181,7 +181,7 @@ class Scene:
         if not self._is_changed:
             return
         before, state, stamp = self._bodies, self._state, self._stamp
-        self._bodies = bodies = Bodies(tuple(self._catalogue.descriptions.values()), self._pieces)
+        self._bodies = bodies = DescribedBodies(tuple(self._catalogue.descriptions.values()), self._pieces)
         self._state, self._stamp = np.zeros(len(bodies.ids), records.STATE), np.full(len(bodies.ids), _NEVER)
         kept = ~np.isin(before.ids, list(self._removed)) & np.isin(before.ids, bodies.ids) & ~before.static
         at = np.searchsorted(bodies.ids, before.ids[kept])

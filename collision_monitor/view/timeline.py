@@ -24,7 +24,7 @@ MARKS: Final = 16
 _CHOOSE: Final = "–"
 
 
-class Timeline:
+class PlayerControls:
     """The controls of a player."""
 
     def __init__(

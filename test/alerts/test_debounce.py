@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from collision_monitor.alerts.debounce import ENTRY, Conditions, Delays, advance, lasting, restart
+from collision_monitor.alerts.debounce import ENTRY, Conditions, Delays, advance_entries, lasting, restart
 
 MS = 1_000_000
 KEY = np.uint64(5 << 32 | 9)
@@ -45,7 +45,7 @@ def test_levels_against_the_whole_past(steps: list[tuple[int, bool, int]], up: i
     for level, doubt, now in zip(levels, doubts, times, strict=True):
         keys = np.array([KEY])
         conditions = Conditions(keys, np.array([level], np.uint8), keys if doubt else keys[:0])
-        rows, before = advance(entries, conditions, now, Delays(up * MS, down * MS))
+        rows, before = advance_entries(entries, conditions, now, Delays(up * MS, down * MS))
         found.append(int(rows["level"][0]) if len(rows) else 0)
         assert (int(before[0]) if len(before) else 0) == ([0, *found][-2])
         entries = lasting(rows)
@@ -61,21 +61,23 @@ def test_pairs_do_not_affect_each_other() -> None:
         here = np.sort(generator.choice(keys, 30, replace=False))
         level = generator.integers(0, 4, 30).astype(np.uint8)
         doubt = here[generator.random(30) < 0.2]
-        together = lasting(advance(together, Conditions(here, level, doubt), step * 30 * MS, delays)[0])
+        together = lasting(advance_entries(together, Conditions(here, level, doubt), step * 30 * MS, delays)[0])
         for key in keys:
             mine = here == key
             conditions = Conditions(here[mine], level[mine], doubt[doubt == key])
-            alone[int(key)] = lasting(advance(alone[int(key)], conditions, step * 30 * MS, delays)[0])
+            alone[int(key)] = lasting(advance_entries(alone[int(key)], conditions, step * 30 * MS, delays)[0])
         np.testing.assert_array_equal(together, np.concatenate([alone[int(key)] for key in keys]))
     assert len(together)
 
 
 def test_a_restart_of_the_time_keeps_the_levels() -> None:
     keys, delays = np.array([KEY]), Delays(0, 100 * MS)
-    entries, _ = advance(np.zeros(0, ENTRY), Conditions(keys, np.array([2], np.uint8), keys[:0]), 10**12, delays)
+    entries, _ = advance_entries(
+        np.zeros(0, ENTRY), Conditions(keys, np.array([2], np.uint8), keys[:0]), 10**12, delays
+    )
     restart(entries, 0)
     nothing = Conditions(keys[:0], np.zeros(0, np.uint8), keys[:0])
-    rows, _ = advance(entries, nothing, 99 * MS, delays)
+    rows, _ = advance_entries(entries, nothing, 99 * MS, delays)
     assert rows["level"].tolist() == [2]
-    rows, before = advance(rows, nothing, 100 * MS, delays)
+    rows, before = advance_entries(rows, nothing, 100 * MS, delays)
     assert (rows["level"].tolist(), before.tolist()) == ([0], [2])

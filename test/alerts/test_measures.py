@@ -9,11 +9,11 @@ import pytest
 
 import collision_monitor as cm
 from collision_monitor.alerts.answered import answered
-from collision_monitor.alerts.closest_approach import closest_approach, sphere_approach
-from collision_monitor.alerts.evaluation import evaluate
+from collision_monitor.alerts.closest_approach import closest_approaches, sphere_approach
+from collision_monitor.alerts.evaluation import evaluate_rule
 from collision_monitor.alerts.protective_separation import ProtectiveSeparation
 from collision_monitor.alerts.rules import Rules
-from collision_monitor.alerts.scene import Scene
+from collision_monitor.alerts.scene import MonitoredBodies
 from collision_monitor.alerts.selection import Classes
 from collision_monitor.alerts.traffic import post_encroachment_time, required_deceleration, time_headway
 from collision_monitor.shapes.pose import Motion
@@ -41,12 +41,12 @@ def rules_of(levels: str) -> Rules:
 
 
 def evaluated(monitor: cm.Monitor, rules: Rules) -> tuple[Any, np.ndarray]:
-    scene = Scene(monitor.roster, monitor.profile, monitor.now)
+    scene = MonitoredBodies(monitor.roster, monitor.profile, monitor.now)
     classes = Classes(rules)
     classes.update(monitor.roster)
     result = monitor.last
     assert result is not None
-    return evaluate(rules, rules.rules[0], classes, scene, answered(scene, result), np.zeros(0, np.uint64))
+    return evaluate_rule(rules, rules.rules[0], classes, scene, answered(scene, result), np.zeros(0, np.uint64))
 
 
 def moved(pose: np.ndarray, twist: np.ndarray, t: float) -> cm.Pose:
@@ -76,11 +76,11 @@ def test_distances_find_exactly_the_pairs_of_brute_force(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_the_closest_approach_against_dense_samples(seed: int) -> None:
     monitor, shapes, poses, twists = made_scene(seed)
-    scene = Scene(monitor.roster, monitor.profile, monitor.now)
+    scene = MonitoredBodies(monitor.roster, monitor.profile, monitor.now)
     generator = np.random.default_rng(seed)
     i, j = generator.integers(0, N // 2, 12).astype(np.int32), generator.integers(N // 2, N, 12).astype(np.int32)
     slots_i, slots_j = (scene.roster.find_slots(ids.astype(np.uint32)) for ids in (i, j))
-    time, least = closest_approach(scene, slots_i, slots_j, 2.0)
+    time, least = closest_approaches(scene, slots_i, slots_j, 2.0)
     bound = sphere_approach(scene, slots_i, slots_j, 2.0)
     times = np.linspace(0.0, 2.0, 401)
     for k in range(len(i)):
@@ -105,8 +105,8 @@ def test_a_pair_whose_distance_grows_has_its_closest_approach_now() -> None:
     monitor.add(1, SHAPES[0])
     monitor.add(2, SHAPES[0])
     monitor.step(0, [1, 2], [(0, 0, 0, 0, 0, 0, 1), (3, 0, 0, 0, 0, 0, 1)], [(-1, 0, 0, 0, 0, 0), (0, 0, 0, 0, 0, 0)])
-    scene = Scene(monitor.roster, monitor.profile, monitor.now)
-    time, least = closest_approach(scene, np.array([0], np.int32), np.array([1], np.int32), 2.0)
+    scene = MonitoredBodies(monitor.roster, monitor.profile, monitor.now)
+    time, least = closest_approaches(scene, np.array([0], np.int32), np.array([1], np.int32), 2.0)
     assert time[0] == 0.0
     assert least[0] == pytest.approx(2.2, abs=0.01)
 
@@ -136,7 +136,7 @@ def test_the_post_encroachment_time_against_small_steps(seed: int) -> None:
     p, q = -u * generator.uniform(1, 5), -v * generator.uniform(1, 5)
     poses = np.array([[*p, 0, 0, 0, 1], [*q, 0, 0, 0, 1]])
     monitor.step(0, [0, 1], poses, np.array([[*u, 0, 0, 0], [*v, 0, 0, 0]]))
-    scene = Scene(monitor.roster, monitor.profile, monitor.now)
+    scene = MonitoredBodies(monitor.roster, monitor.profile, monitor.now)
     pair = np.array([0], np.int32), np.array([1], np.int32)
     expected = max(_passing_time(p, u, q, v, 0.7), 0.0)
     found, turned = post_encroachment_time(scene, *pair, 8.0)[0], post_encroachment_time(scene, *pair[::-1], 8.0)[0]
@@ -154,7 +154,7 @@ def test_paths_that_do_not_cross_have_no_post_encroachment_time() -> None:
     twists = np.zeros((4, 6))
     twists[:, :3] = [(1, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 0)]  # along, parallel, above, at rest
     monitor.step(0, range(4), poses, twists)
-    scene = Scene(monitor.roster, monitor.profile, monitor.now)
+    scene = MonitoredBodies(monitor.roster, monitor.profile, monitor.now)
     others = np.array([1, 2, 3], np.int32)
     assert np.isinf(post_encroachment_time(scene, np.zeros(3, np.int32), others, 2.0)).all()
 

@@ -7,7 +7,7 @@ import pytest
 
 from collision_monitor.broad_phase.hashed_grid import make_hashed_grid, put_boxes, remove_boxes
 from collision_monitor.broad_phase.region import Region
-from collision_monitor.broad_phase.sorted_boxes import note_changed, overlapping, sorted_boxes
+from collision_monitor.broad_phase.sorted_boxes import note_changed, overlapping_boxes, sorted_boxes
 
 
 @pytest.mark.parametrize("spread", [8.0, 1e4], ids=["dense", "hashed"])
@@ -27,7 +27,7 @@ def test_boxes_that_change_are_found_where_they_are(spread: float) -> None:
     for turn in range(6):
         for i in rng.integers(0, n, 60):
             region = Region(*centre[i], *half[i])
-            count = overlapping(boxes, region, found)
+            count = overlapping_boxes(boxes, region, found)
             assert len(set(found[:count].tolist())) == count
             got = {j for j in found[:count].tolist() if grid.box[j]["level"] >= 0}
             there = np.flatnonzero(grid.box["level"] >= 0)

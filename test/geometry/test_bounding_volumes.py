@@ -9,7 +9,7 @@ from point_sets import SETS, rotation
 from rational import volume6
 
 from collision_monitor.errors import InputError, ShapeError
-from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS, aabb, convex_hull, inside_kdop, kdop
+from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS, aabb, convex_hull, inside_kdop, kdop_of_points
 from collision_monitor.geometry.orientation import orient3d
 
 SOLIDS = [name for name in SETS if name not in ("flat", "line", "one point", "one point, often", "two points")]
@@ -33,7 +33,7 @@ def test_aabb_volume():
 @pytest.mark.parametrize("k", KDOP_DIRECTIONS)
 def test_kdop_holds_its_points_in_rational_numbers(name, k):
     points = SETS[name][:20]
-    slabs = kdop(points, k)
+    slabs = kdop_of_points(points, k)
     assert slabs.directions.shape == (k // 2, 3)
     for n, low, high in zip(slabs.directions, slabs.lower, slabs.upper, strict=True):
         dots = [sum(Fraction(float(x)) * Fraction(float(y)) for x, y in zip(n, p, strict=True)) for p in points]
@@ -44,23 +44,23 @@ def test_kdop_holds_its_points_in_rational_numbers(name, k):
 
 def test_a_6_dop_is_the_aabb_and_more_directions_are_tighter():
     points = SETS["cloud"]
-    box, slabs = aabb(points), kdop(points, 6)
+    box, slabs = aabb(points), kdop_of_points(points, 6)
     assert (slabs.lower == box.lower).all() and (slabs.upper == box.upper).all()
     probes = np.random.default_rng(0).uniform(box.lower, box.upper, (5000, 3))
-    kept = {k: inside_kdop(probes, kdop(points, k)) for k in KDOP_DIRECTIONS}
+    kept = {k: inside_kdop(probes, kdop_of_points(points, k)) for k in KDOP_DIRECTIONS}
     assert (kept[26] <= kept[14]).all() and (kept[26] <= kept[18]).all() and (kept[14] <= kept[6]).all()
     assert kept[26].sum() < kept[14].sum() < kept[6].sum()
 
 
 def test_directions_of_the_users_choice():
     turn = rotation(1)
-    slabs = kdop(SETS["turned box"], 5 * turn.T)
+    slabs = kdop_of_points(SETS["turned box"], 5 * turn.T)
     assert np.allclose(slabs.upper, [3, 2, 0.5], rtol=1e-14) and np.allclose(slabs.lower, [-3, -2, -0.5], rtol=1e-14)
     assert not inside_kdop(turn @ [3.1, 0, 0], slabs)
     with pytest.raises(InputError, match="zero vector"):
-        kdop(SETS["cube"], [[0, 0, 0]])
+        kdop_of_points(SETS["cube"], [[0, 0, 0]])
     with pytest.raises(InputError, match=r"\[6, 14, 18, 26\]"):
-        kdop(SETS["cube"], 8)
+        kdop_of_points(SETS["cube"], 8)
 
 
 @pytest.mark.parametrize("name", SOLIDS)
@@ -95,7 +95,7 @@ def test_what_spans_no_solid_has_no_hull(name):
         convex_hull(SETS[name])
 
 
-@pytest.mark.parametrize("make", [aabb, kdop, convex_hull])
+@pytest.mark.parametrize("make", [aabb, kdop_of_points, convex_hull])
 @pytest.mark.parametrize(
     "bad", [[], np.zeros((0, 3)), [[0, 0, np.nan]], [[0, 0, np.inf]], [0, 0, 0], [[1, 2, 3, 4]], None]
 )

@@ -6,7 +6,7 @@ from point_sets import rotation
 from solids import cube, octahedron, u_shape
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.contact_features import FeaturePair, FeatureType, classify_contact, feature_at
+from collision_monitor.geometry.contact_features import FeaturePair, FeatureType, classify_contact, mesh_feature_at
 
 UP = [0, 0, 1]
 R2 = 2**-0.5
@@ -64,7 +64,7 @@ def test_in_words():
     found = classify_contact(point, vertices, faces, point, *octahedron_on(point), [0, 0, 1])
     assert str(found.b) == "vertex 5" and found.a.type is FeatureType.FACE
     assert str(found).startswith("face ") and str(found).endswith("of A on vertex 5 of B")
-    edge = feature_at([0.5, 0, 0], [0, -1, -1], vertices, faces)
+    edge = mesh_feature_at([0.5, 0, 0], [0, -1, -1], vertices, faces)
     assert edge.type is FeatureType.EDGE
     assert {tuple(vertices[i]) for i in edge.vertices} == {(0, 0, 0), (1, 0, 0)}
     assert str(edge) == f"edge {edge.vertices[0]}-{edge.vertices[1]}"
@@ -79,36 +79,36 @@ def octahedron_on(point):
 def test_a_face_beats_its_own_edges_and_corners():
     vertices, faces = cube()
     for point in ([0.5, 0.25, 1], [0.5, 0, 1], [0, 0, 1]):
-        found = feature_at(point, UP, vertices, faces)
+        found = mesh_feature_at(point, UP, vertices, faces)
         assert found.type is FeatureType.FACE and (vertices[list(found.vertices)][:, 2] == 1).all()
-    assert feature_at([0, 0, 1], [-1, 0, 1], vertices, faces).type is FeatureType.EDGE
-    assert feature_at([0, 0, 1], [-1, -1, 1], vertices, faces).type is FeatureType.VERTEX
+    assert mesh_feature_at([0, 0, 1], [-1, 0, 1], vertices, faces).type is FeatureType.EDGE
+    assert mesh_feature_at([0, 0, 1], [-1, -1, 1], vertices, faces).type is FeatureType.VERTEX
 
 
 def test_what_is_pierced_is_named_by_the_place():
     vertices, faces = cube()
-    assert feature_at([0.5, 0.25, 1], [1, 1, 1], vertices, faces).type is FeatureType.FACE
-    assert feature_at([0.5, 0, 1], [1, 1, 1], vertices, faces).type is FeatureType.EDGE
+    assert mesh_feature_at([0.5, 0.25, 1], [1, 1, 1], vertices, faces).type is FeatureType.FACE
+    assert mesh_feature_at([0.5, 0, 1], [1, 1, 1], vertices, faces).type is FeatureType.EDGE
 
 
 def test_concave_meshes_by_the_place_too():
     vertices, faces = u_shape()
-    floor = feature_at([1.5, 0.5, 1], UP, vertices, faces)
+    floor = mesh_feature_at([1.5, 0.5, 1], UP, vertices, faces)
     assert floor.type is FeatureType.FACE and (vertices[list(floor.vertices)][:, 2] == 1).all()
-    top = feature_at([0.5, 0.5, 3], UP, vertices, faces)
+    top = mesh_feature_at([0.5, 0.5, 3], UP, vertices, faces)
     assert (vertices[list(top.vertices)][:, 2] == 3).all()
 
 
 def test_each_side_of_a_plate_without_thickness():
     corners = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], float)
     plate = corners, np.array([[0, 1, 2], [0, 2, 3], [0, 2, 1], [0, 3, 2]])
-    assert feature_at([0.5, 0.25, 0], [0, 0, 1], *plate).face == 0
-    assert feature_at([0.5, 0.25, 0], [0, 0, -1], *plate).face == 2
+    assert mesh_feature_at([0.5, 0.25, 0], [0, 0, 1], *plate).face == 0
+    assert mesh_feature_at([0.5, 0.25, 0], [0, 0, -1], *plate).face == 2
 
 
 def test_points_off_the_surface_are_refused():
     vertices, faces = cube()
     with pytest.raises(InputError, match="surface"):
-        feature_at([0.5, 0.5, 0.5], UP, vertices, faces)
+        mesh_feature_at([0.5, 0.5, 0.5], UP, vertices, faces)
     with pytest.raises(InputError, match="finite"):
-        feature_at([0.5, 0.5, np.nan], UP, vertices, faces)
+        mesh_feature_at([0.5, 0.5, np.nan], UP, vertices, faces)

@@ -124,7 +124,7 @@ def test_points_beyond_a_hull() -> None:
     rng = np.random.default_rng(3)
     for scale in ((1.0, 1.0, 1.0), (1.0, 1.0, 1e-4), (1.0, 1.0, 1e-11)):
         points = rng.normal(size=(400, 3)) * scale + [1.0, -2.0, 3.0]
-        found, plain = qhull.Hull(points), Qhull(points)
+        found, plain = qhull.QhullResult(points), Qhull(points)
         probes = rng.normal(size=(500, 3)) * np.multiply(scale, 2.0) + [1.0, -2.0, 3.0]
         for limit in (0.0, 1e-3, 0.3):
             heights = (probes @ plain.equations[:, :3].T + plain.equations[:, 3]).max(axis=1)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from rational import EXPONENTS, POINTS_2D, POINTS_3D, area2, sign, volume6
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.orientation import LARGEST, SMALLEST, cross, orient2d, orient3d
+from collision_monitor.geometry.orientation import LARGEST, SMALLEST, orient2d, orient3d, segments_cross
 
 NUDGES = st.lists(st.integers(-2, 2), min_size=12, max_size=12)
 
@@ -83,7 +83,7 @@ def test_a_lost_product_is_not_enlarged_to_a_certain_one():
 
 def test_a_column_of_zeros_is_zero_where_the_others_overflow():
     assert orient3d([1, -1e308, 0], [1, 1e308, -1e308], [1, 0, 1e308], [1, 1e308, 1e308]) == 0.0
-    assert cross([0, -1e308], [0, 1e308], [0, 1e308], [0, -1e308]) == 0.0
+    assert segments_cross([0, -1e308], [0, 1e308], [0, 1e308], [0, -1e308]) == 0.0
 
 
 @given(st.tuples(POINTS_2D, POINTS_2D, POINTS_2D), NUDGES)
@@ -112,8 +112,8 @@ def test_underflow_and_overflow_keep_the_sign(scale):
 
 
 def test_parallel_vectors_of_different_points():
-    assert cross([0, 0], [0.1, 0.3], [5, 5], [5.125, 5.375]) != 0  # 0.1 is not exactly representable
-    assert cross([0, 0], [1, 3], [5, 5], [5.125, 5.375]) == 0
+    assert segments_cross([0, 0], [0.1, 0.3], [5, 5], [5.125, 5.375]) != 0  # 0.1 is not exactly representable
+    assert segments_cross([0, 0], [1, 3], [5, 5], [5.125, 5.375]) == 0
 
 
 def test_arrays_broadcast():

@@ -8,7 +8,7 @@ from random_polygons import HARD, convex, histograms, star_shaped
 from rational import EXPONENTS, in_polygon
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.point_in_polygon import Location, locate, locate_in_convex
+from collision_monitor.geometry.point_in_polygon import Location, locate_in_convex, locate_in_polygon
 
 HALVES = st.integers(-1, 12).map(lambda n: n / 2)
 
@@ -20,8 +20,8 @@ def test_rays_through_corners_and_along_edges(polygon, points, exponent):
     scale = 2.0**exponent
     for turn in ([[1, 0], [0, 1]], [[0, -1], [1, 0]], [[-1, 0], [0, -1]], [[1, 1], [-1, 1]], [[1, 0], [0, -1]]):
         moved, where = polygon @ np.array(turn) * scale, np.array(points) @ np.array(turn) * scale
-        assert locate(where, moved).tolist() == expected
-        assert locate(where, np.roll(moved[::-1], 2, axis=0)).tolist() == expected
+        assert locate_in_polygon(where, moved).tolist() == expected
+        assert locate_in_polygon(where, np.roll(moved[::-1], 2, axis=0)).tolist() == expected
 
 
 @pytest.mark.parametrize("name", HARD)
@@ -30,7 +30,7 @@ def test_the_hard_ones(name):
     rng = np.random.default_rng(0)
     corners = polygon[rng.integers(len(polygon), size=(40, 3))]
     points = np.vstack([polygon, corners[:, :2].mean(axis=1), corners.mean(axis=1), np.nextafter(polygon, 10)])
-    assert locate(points, polygon).tolist() == [in_polygon(p, polygon) for p in points]
+    assert locate_in_polygon(points, polygon).tolist() == [in_polygon(p, polygon) for p in points]
 
 
 @settings(max_examples=40)
@@ -38,7 +38,7 @@ def test_the_hard_ones(name):
 def test_random_polygons(seed, corners):
     rng = np.random.default_rng(seed)
     polygon, points = star_shaped(rng, corners), rng.uniform(-1, 1, (6, 2))
-    assert locate(points, polygon).tolist() == [in_polygon(p, polygon) for p in points]
+    assert locate_in_polygon(points, polygon).tolist() == [in_polygon(p, polygon) for p in points]
 
 
 @settings(max_examples=25)
@@ -47,14 +47,14 @@ def test_the_sided_test_agrees_on_convex_ones(seed, corners):
     rng = np.random.default_rng(seed)
     polygon = convex(rng, corners)
     points = np.vstack([rng.uniform(-2, 2, (20, 2)), polygon, (polygon + np.roll(polygon, 1, axis=0)) / 2])
-    assert locate_in_convex(points, polygon).tolist() == locate(points, polygon).tolist()
-    assert locate_in_convex(points, polygon[::-1]).tolist() == locate(points, polygon).tolist()
+    assert locate_in_convex(points, polygon).tolist() == locate_in_polygon(points, polygon).tolist()
+    assert locate_in_convex(points, polygon[::-1]).tolist() == locate_in_polygon(points, polygon).tolist()
 
 
 def test_leading_dimensions_and_names():
     square = HARD["square"]
-    assert locate([0.5, 0.5], square) == Location.INSIDE
-    assert locate([[[0.5, 1]], [[2, 0.5]]], square).tolist() == [[Location.BOUNDARY], [Location.OUTSIDE]]
+    assert locate_in_polygon([0.5, 0.5], square) == Location.INSIDE
+    assert locate_in_polygon([[[0.5, 1]], [[2, 0.5]]], square).tolist() == [[Location.BOUNDARY], [Location.OUTSIDE]]
     assert locate_in_convex([[[0.5, 1]], [[2, 0.5]]], square).tolist() == [[Location.BOUNDARY], [Location.OUTSIDE]]
     assert locate_in_convex([0.5, 0.5], np.repeat(square, 2, axis=0)) == Location.INSIDE
 
@@ -62,6 +62,6 @@ def test_leading_dimensions_and_names():
 @pytest.mark.parametrize("bad", [[np.nan, 0], [], [1, 2, 3]])
 def test_bad_points_are_refused(bad):
     with pytest.raises(InputError, match="expected"):
-        locate(bad, HARD["square"])
+        locate_in_polygon(bad, HARD["square"])
     with pytest.raises(InputError, match="expected"):
         locate_in_convex(bad, HARD["square"])

@@ -11,13 +11,13 @@ from rational import EXPONENTS, POINTS_2D, area2, common_points
 
 from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.polygons import (
+    corner_turns,
     interior_angles,
     is_convex,
     is_counter_clockwise,
     is_simple,
     passes_line_test,
     signed_area,
-    turns,
 )
 
 CONVEX = ("square", "straight corners", "needle")
@@ -70,13 +70,13 @@ def test_right_angled_polygons(polygon):
     assert np.allclose(angles.sum(), (len(polygon) - 2) * np.pi)
     assert is_simple(polygon)
     assert is_convex(polygon) == passes_line_test(polygon) == bool((angles < 3.2).all())
-    assert is_convex(polygon) == (not (turns(polygon) < 0).any())
+    assert is_convex(polygon) == (not (corner_turns(polygon) < 0).any())
 
 
 def test_one_sign_of_the_cross_products_is_not_enough():
     k = np.arange(5) * 4 * np.pi / 5
     pentagram = np.array([np.cos(k), np.sin(k)]).T
-    assert len(set(np.sign(turns(pentagram)))) == 1
+    assert len(set(np.sign(corner_turns(pentagram)))) == 1
     assert not is_convex(pentagram) and not is_simple(pentagram)
 
 

@@ -10,7 +10,7 @@ from random_polygons import HARD, convex, histograms, star_shaped
 from rational import EXPONENTS, area2
 
 from collision_monitor.errors import ShapeError
-from collision_monitor.geometry.point_in_polygon import Location, locate
+from collision_monitor.geometry.point_in_polygon import Location, locate_in_polygon
 from collision_monitor.geometry.polygons import is_convex
 from collision_monitor.geometry.triangulation import convex_parts, triangulate
 
@@ -68,8 +68,10 @@ def test_convex_ones_stay_whole():
 def test_the_parts_hold_the_same_points():
     rng = np.random.default_rng(5)
     polygon, points = star_shaped(rng, 30), rng.uniform(-1, 1, (500, 2))
-    inside = np.any([locate(points, polygon[part]) != Location.OUTSIDE for part in convex_parts(polygon)], axis=0)
-    assert (inside == (locate(points, polygon) != Location.OUTSIDE)).all()
+    inside = np.any(
+        [locate_in_polygon(points, polygon[part]) != Location.OUTSIDE for part in convex_parts(polygon)], axis=0
+    )
+    assert (inside == (locate_in_polygon(points, polygon) != Location.OUTSIDE)).all()
 
 
 def test_a_repeated_corner_is_used_once():

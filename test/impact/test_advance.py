@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 import collision_monitor as cm
 from collision_monitor._jit import kernel
-from collision_monitor.impact.advance import Placed, advance
+from collision_monitor.impact.advance import Placed, advance_along_axis
 from collision_monitor.shapes.pose import from_rotation_vector, rotation_matrix
 from collision_monitor.shapes.reach import reach
 from collision_monitor.shapes.shape_table import ShapeTable, ShapeTableBuilder
@@ -39,7 +39,9 @@ def _advances(table: Any, rotation: Any, rows: Any, gap: float, until: float, fo
             (r[4, 0], r[4, 1], r[4, 2]), (r[5, 0], r[5, 1], r[5, 2]), (r[8, 0], r[8, 1], r[8, 2]),
             (r[6, 0], r[6, 1], r[6, 2]), (r[7, 0], r[7, 1], r[7, 2]),
         )  # fmt: skip
-        found[k] = advance(table, at, (r[0, 0], r[0, 1], r[0, 2]), (r[1, 0], r[1, 1], r[1, 2]), 0.0, gap, until)
+        found[k] = advance_along_axis(
+            table, at, (r[0, 0], r[0, 1], r[0, 2]), (r[1, 0], r[1, 1], r[1, 2]), 0.0, gap, until
+        )
 
 
 def _table(a: Any, b: Any) -> ShapeTable:

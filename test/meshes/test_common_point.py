@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from collision_monitor._jit import kernel
 from collision_monitor.meshes.distance.nearest import MEMORY
-from collision_monitor.meshes.distance.triangle_pair import Triangle
+from collision_monitor.meshes.distance.triangle_pair import Corners
 from collision_monitor.meshes.overlap.common_part import common_part, is_flat, normal_of
 from collision_monitor.meshes.overlap.common_point import common_ball
 from collision_monitor.meshes.placing import relative
@@ -25,8 +25,8 @@ FACES = np.array([face for a, b, c, d in SQUARE for face in ((a, b, c), (a, c, d
 
 @kernel
 def parts(S, T, slack, out):  # type: ignore[no-untyped-def]
-    A = Triangle((S[0, 0], S[0, 1], S[0, 2]), (S[1, 0], S[1, 1], S[1, 2]), (S[2, 0], S[2, 1], S[2, 2]))
-    B = Triangle((T[0, 0], T[0, 1], T[0, 2]), (T[1, 0], T[1, 1], T[1, 2]), (T[2, 0], T[2, 1], T[2, 2]))
+    A = Corners((S[0, 0], S[0, 1], S[0, 2]), (S[1, 0], S[1, 1], S[1, 2]), (S[2, 0], S[2, 1], S[2, 2]))
+    B = Corners((T[0, 0], T[0, 1], T[0, 2]), (T[1, 0], T[1, 1], T[1, 2]), (T[2, 0], T[2, 1], T[2, 2]))
     n, m = normal_of(A), normal_of(B)
     part = common_part(A, B, n, m, slack)
     out[0], out[1], out[2] = part.middle

@@ -11,7 +11,7 @@ from collision_monitor._jit import kernel
 from collision_monitor.meshes.advance.approach import Approach
 from collision_monitor.meshes.advance.leaf_times import leaf_time
 from collision_monitor.meshes.distance.nearest import MEMORY
-from collision_monitor.meshes.distance.triangle_pair import Triangle, closest_points
+from collision_monitor.meshes.distance.triangle_pair import Corners, closest_triangle_points
 from collision_monitor.meshes.layout import CHILD, WIDTH
 from collision_monitor.meshes.placing import Placing
 from collision_monitor.meshes.trees.tree import tree_of
@@ -37,11 +37,11 @@ def least_distances(a, b, out):
         best = np.inf
         for i in range(a.shape[1]):
             x = a[s, i]
-            first = Triangle((x[0, 0], x[0, 1], x[0, 2]), (x[1, 0], x[1, 1], x[1, 2]), (x[2, 0], x[2, 1], x[2, 2]))
+            first = Corners((x[0, 0], x[0, 1], x[0, 2]), (x[1, 0], x[1, 1], x[1, 2]), (x[2, 0], x[2, 1], x[2, 2]))
             for j in range(b.shape[1]):
                 y = b[s, j]
-                second = Triangle((y[0, 0], y[0, 1], y[0, 2]), (y[1, 0], y[1, 1], y[1, 2]), (y[2, 0], y[2, 1], y[2, 2]))
-                best = min(best, closest_points(first, second).squared)
+                second = Corners((y[0, 0], y[0, 1], y[0, 2]), (y[1, 0], y[1, 1], y[1, 2]), (y[2, 0], y[2, 1], y[2, 2]))
+                best = min(best, closest_triangle_points(first, second).squared)
         out[s] = np.sqrt(best)
 
 

@@ -8,7 +8,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from collision_monitor.meshes.layout import AXES, CENTER, CHILD, CORNERS, HALF, RADIUS, WIDTH
-from collision_monitor.meshes.supports import reach_along, support_bounds
+from collision_monitor.meshes.supports import content_reach_along, support_bounds
 from collision_monitor.meshes.trees.cloud_tree import cloud_tree
 from collision_monitor.meshes.trees.tree import tree_of
 
@@ -47,7 +47,7 @@ def test_the_supports_hold_the_content_of_a_box_and_are_within_the_box(tree):
         most = tree[block, CENTER : CENTER + 3, member] @ DIRECTIONS.T
         most = most + tree[block, HALF : HALF + 3, member] @ np.abs(axes.T @ DIRECTIONS.T)
         for k, d in enumerate(DIRECTIONS):
-            reach = reach_along(tree, block, member, tuple(d))
+            reach = content_reach_along(tree, block, member, tuple(d))
             assert least[k] <= reach <= most[k] + 1e-12
             wider = max(wider, most[k] - reach)
             support_bounds(tuple(d), tuple(-d), (100.0, 0.0), tree, block, scratch, 0)  # of the whole block at once

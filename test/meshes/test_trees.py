@@ -187,7 +187,7 @@ def test_the_reach_of_a_tree_is_that_of_its_corners():
 
 
 def test_a_point_is_inside_a_closed_surface_where_the_exact_test_says_so():
-    from collision_monitor.query.contact.mesh_pairs import query_memory, trees_overlap
+    from collision_monitor.query.contact.mesh_pairs import packed_trees_overlap, query_memory
 
     rng = np.random.default_rng(9)
     tree = tree_of(SURFACES["ring"], closed=True)
@@ -195,7 +195,7 @@ def test_a_point_is_inside_a_closed_surface_where_the_exact_test_says_so():
     expected = locate_in_polyhedron(points, RING.vertices, RING.faces) >= 0
     dot = tree_of(np.zeros((1, 3, 3)))
     poses = np.column_stack([points, np.zeros((300, 3)), np.ones(300)])
-    got = [bool(trees_overlap(tree, np.eye(7)[6:], dot, pose[None], query_memory())) for pose in poses]
+    got = [bool(packed_trees_overlap(tree, np.eye(7)[6:], dot, pose[None], query_memory())) for pose in poses]
     assert got == expected.tolist()
     assert expected.any() and not expected.all()
 

@@ -10,7 +10,7 @@ import trimesh
 from scipy.spatial import cKDTree
 
 import collision_monitor as cm
-from collision_monitor.geometry.qhull import Hull
+from collision_monitor.geometry.qhull import QhullResult
 from collision_monitor.objects import models
 from collision_monitor.objects.excess import BLOCK, BLOCKS
 from collision_monitor.objects.models import containing_kdop, containing_model, monitored_model
@@ -69,9 +69,9 @@ def test_no_point_of_the_hull_is_farther_from_the_mesh_than_the_excess() -> None
         used = v[np.unique(f)]
         found = monitored_model([(mesh, cm.Pose())], Model.AUTO)
         assert found.model is Model.CONVEX_HULL and found.corners[0] is not None
-        assert np.array_equal(found.pieces[0][0].points, used[Hull(used).vertices])
+        assert np.array_equal(found.pieces[0][0].points, used[QhullResult(used).vertices])
         probes = rng.uniform(v.min(axis=0), v.max(axis=0), (3000, 3))
-        probes = probes[~Hull(used).beyond(probes, 0.0)]
+        probes = probes[~QhullResult(used).beyond(probes, 0.0)]
         weights = rng.dirichlet(np.full(3, 0.5), (30, len(f)))
         surface = np.einsum("ijk,jkl->ijl", weights, v[f]).reshape(-1, 3)
         if not len(mesh.surface.hole):

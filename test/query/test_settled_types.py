@@ -13,7 +13,7 @@ from numba import typeof
 import collision_monitor as cm
 from collision_monitor._jit.settled import SettledFunction
 from collision_monitor.query.contact.contact_rows import contact_row
-from collision_monitor.query.contact.mesh_pairs import roots_apart, trees_contact, trees_overlap
+from collision_monitor.query.contact.mesh_pairs import packed_trees_overlap, roots_apart, trees_contact
 from collision_monitor.query.impact.mesh_impact import _impact_in_hulls, _mesh_impact
 
 TORUS = trimesh.creation.torus(1.0, 0.4, major_sections=12, minor_sections=8)
@@ -32,7 +32,7 @@ SHAPES: list[cm.Shape] = [
     cm.Mesh(SOUP.astype(np.float32), np.arange(60, dtype=np.int32).reshape(20, 3)),
     cm.Mesh(TORUS.vertices, TORUS.faces[:-30]),
 ]
-KERNELS = (contact_row, trees_contact, trees_overlap, roots_apart, _mesh_impact, _impact_in_hulls)
+KERNELS = (contact_row, trees_contact, packed_trees_overlap, roots_apart, _mesh_impact, _impact_in_hulls)
 
 
 class Seen:

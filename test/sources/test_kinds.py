@@ -30,7 +30,7 @@ from collision_monitor.records import StateFlag
 from collision_monitor.sources.ground.covariances import usable_blocks
 from collision_monitor.sources.ground.frames import FrameMotion
 from collision_monitor.sources.ground.scene_states import squares
-from collision_monitor.sources.messages.clouds import cloud_points, scan_points, thinned
+from collision_monitor.sources.messages.clouds import read_cloud_points, scan_points, thinned
 
 STEP = 50_000_000
 SPHERE = {"sphere": 1.0}
@@ -440,20 +440,20 @@ def test_points_of_scans() -> None:
     points = rng.normal(size=(500, 3)).astype(np.float32).astype(np.float64)
     points[7] = np.nan
     _, cloud = point_cloud("lidar", START, points, gap=20)
-    found, lost = cloud_points(cloud)
+    found, lost = read_cloud_points(cloud)
     np.testing.assert_array_equal(found, np.delete(points, 7, 0))
     assert lost == 1
     cloud.is_bigendian = True
-    assert not np.array_equal(cloud_points(cloud)[0], np.delete(points, 7, 0))
+    assert not np.array_equal(read_cloud_points(cloud)[0], np.delete(points, 7, 0))
     cloud.is_bigendian, cloud.width = False, 501
     with pytest.raises(InputError, match="data: expected 1 rows of"):
-        cloud_points(cloud)
+        read_cloud_points(cloud)
     cloud.width = 1 << 31
     with pytest.raises(InputError, match="expected at most 2000000 points"):
-        cloud_points(cloud)
+        read_cloud_points(cloud)
     cloud.width, cloud.fields = 500, cloud.fields[:2]
     with pytest.raises(InputError, match=r"fields: expected x, y and z of FLOAT32 \(7\)"):
-        cloud_points(cloud)
+        read_cloud_points(cloud)
 
 
 def test_a_scan_is_one_object_without_the_points_on_the_robot_that_carries_the_sensor() -> None:

@@ -16,7 +16,7 @@ from collision_monitor.shapes.shapes import Sphere
 from collision_monitor.view.levels import COLORS, Level
 from collision_monitor.view.picture import Role, draw
 from collision_monitor.view.recording import Recording
-from collision_monitor.view.scene import Scene
+from collision_monitor.view.scene import TopicContent
 
 OBJECTS = [ObjectDescription(1, Sphere(0.5), name="cart 1"), ObjectDescription(2, Sphere(0.3), name="person 2")]
 ALWAYS = ", quiet_at_rest: false, quiet_when_parting: false"
@@ -68,7 +68,7 @@ def test_a_session_without_rules_is_coloured_by_the_answers(tmp_path: Path) -> N
 
 
 def test_live_alerts_hold_as_long_as_they_are_repeated() -> None:
-    source, scene = AlertScene(OBJECTS, RULES), Scene()
+    source, scene = AlertScene(OBJECTS, RULES), TopicContent()
     scene.take("ObjectDescriptionArray", encode_descriptions(0, "world", OBJECTS))
 
     def feed(step: int) -> None:

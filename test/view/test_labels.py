@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from collision_monitor.view.labels import Label, _joined, labels
 from collision_monitor.view.levels import Level
 from collision_monitor.view.pair_list import PairRow
-from collision_monitor.view.scene import Scene
+from collision_monitor.view.scene import TopicContent
 
 
 def row(a: int, b: int, when: str, *place: float) -> PairRow:
@@ -18,7 +18,7 @@ def row(a: int, b: int, when: str, *place: float) -> PairRow:
 
 
 def test_a_label_keeps_its_key_while_its_text_and_rank_change() -> None:
-    moment, zero = Scene().moment(), np.zeros(3)
+    moment, zero = TopicContent().moment(), np.zeros(3)
     before = labels(moment, [row(1, 2, "0.5 s", 1, 2, 3), row(3, 4, "0.6 s", 50, 0, 0)], None, zero, 10.0, 1.0)
     after = labels(moment, [row(3, 4, "0.1 s", 50, 0, 0), row(1, 2, "0.4 s", 1, 2, 3)], None, zero, 10.0, 1.0)
     assert [each.key for each in before] == ["1_2", "3_4"]
@@ -28,7 +28,7 @@ def test_a_label_keeps_its_key_while_its_text_and_rank_change() -> None:
 
 
 def test_a_pair_without_a_place_has_no_label() -> None:
-    assert labels(Scene().moment(), [row(1, 2, "now")], None, np.zeros(3), 10.0, 1.0) == []
+    assert labels(TopicContent().moment(), [row(1, 2, "now")], None, np.zeros(3), 10.0, 1.0) == []
 
 
 @given(st.lists(st.tuples(*[st.floats(-10, 10)] * 3), max_size=6), st.floats(0.1, 5.0))

@@ -25,7 +25,7 @@ from collision_monitor.shapes.shapes import ConvexHull, Points
 from collision_monitor.view.page import MOST_HIDDEN, Page
 from collision_monitor.view.panel import WIDTH, look_at
 from collision_monitor.view.picture import draw
-from collision_monitor.view.scene import Scene
+from collision_monitor.view.scene import TopicContent
 from collision_monitor.view.server import LOOPBACK, start_server, stop_server
 
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
@@ -81,7 +81,7 @@ def test_forms_that_come_and_go_do_not_pile_up() -> None:
     server = start_server(LOOPBACK, 0)
     page, rng = Page(server, lambda _: None), np.random.default_rng(0)
     for k in range(3 * MOST_HIDDEN):
-        scene = Scene()
+        scene = TopicContent()
         hull = ObjectDescription(1, ConvexHull(rng.normal(size=(6, 3))), static=True, pose=Pose())
         scan = ObjectDescription(2, Points(rng.normal(size=(9, 3)), 0.1), static=True, pose=Pose())
         scene.take("ObjectDescriptionArray", encode_descriptions(k, "world", [hull, scan], snapshot=True))

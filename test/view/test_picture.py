@@ -28,12 +28,12 @@ from collision_monitor.shapes.shapes import (
     Shape,
     Sphere,
 )
-from collision_monitor.view.bodies import MOST_FORMS, Bodies, described_pieces
+from collision_monitor.view.bodies import MOST_FORMS, DescribedBodies, described_pieces
 from collision_monitor.view.forms import pieces_of
 from collision_monitor.view.levels import COLORS, Level, object_levels
 from collision_monitor.view.paths import SAMPLES, SIGMAS, tubes
 from collision_monitor.view.picture import Role, draw
-from collision_monitor.view.scene import Scene
+from collision_monitor.view.scene import TopicContent
 from collision_monitor.world.scene import state_array
 
 CORNERS = [(x, y, z) for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)]
@@ -48,13 +48,15 @@ SOLIDS: list[tuple[Shape, float]] = [
 ]
 
 
-def scene_of(*objects: ObjectDescription) -> Scene:
-    scene = Scene()
+def scene_of(*objects: ObjectDescription) -> TopicContent:
+    scene = TopicContent()
     scene.take("ObjectDescriptionArray", encode_descriptions(1, "world", list(objects), snapshot=True))
     return scene
 
 
-def answered(scene: Scene, objects: list[ObjectDescription], rows: np.ndarray, stamp: int = 10**9) -> Scene:
+def answered(
+    scene: TopicContent, objects: list[ObjectDescription], rows: np.ndarray, stamp: int = 10**9
+) -> TopicContent:
     """Take states and the answers of a real pipeline."""
     pipeline = Pipeline("exact")
     pipeline.on_shapes(encode_descriptions(1, "world", objects, snapshot=True))
@@ -106,9 +108,9 @@ def test_flat_shapes_lie_where_they_are(shape: Shape) -> None:
 def test_equal_meshes_share_a_form_and_too_many_become_boxes() -> None:
     faces = [(0, 1, 2), (0, 3, 1), (0, 2, 3), (1, 3, 2)]
     corners = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], float)
-    twice = Bodies([ObjectDescription(k, Mesh(corners, faces)) for k in range(3)])
+    twice = DescribedBodies([ObjectDescription(k, Mesh(corners, faces)) for k in range(3)])
     assert len(twice.pieces) == 1
-    many = Bodies([ObjectDescription(k, Mesh(corners * (1 + k), faces)) for k in range(MOST_FORMS + 5)])
+    many = DescribedBodies([ObjectDescription(k, Mesh(corners * (1 + k), faces)) for k in range(MOST_FORMS + 5)])
     assert many.boxed == 5 and len(many.pieces) == MOST_FORMS + 1
     last = many.pieces["box"]
     np.testing.assert_allclose(last.scale[-1], MOST_FORMS + 5, rtol=1e-6)
@@ -258,7 +260,7 @@ def test_compounds_are_placed_as_a_whole() -> None:
 
 
 def test_an_empty_scene_has_a_picture() -> None:
-    picture = draw(Scene().moment())
+    picture = draw(TopicContent().moment())
     assert not picture.batches and not picture.rows and not picture.is_known and picture.extent > 0.0
 
 

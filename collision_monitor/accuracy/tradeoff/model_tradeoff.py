@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.accuracy.playback import Played, Step, contacts_by_pair, play
+from collision_monitor.accuracy.playback import Played, Step, contacts_by_pair, play_steps
 from collision_monitor.accuracy.tradeoff.measurement import Errors, Measurement
 from collision_monitor.errors import InputError
 from collision_monitor.monitor.monitor import Monitor
@@ -52,7 +52,7 @@ def model_tradeoff(
     sampled = np.unique(np.linspace(0, len(steps) - 1, COMPARED_STEPS).astype(int)).tolist()
     profile = Profile(contact_margin=NEAR)
     played = {
-        model: play(Monitor(profile), [replace(each, model=model) for each in described], steps, progress)
+        model: play_steps(Monitor(profile), [replace(each, model=model) for each in described], steps, progress)
         for model in map(parse_model, models)
     }
     pairs = [set[Pair]().union(*(contacts_by_pair(each.answers[k]) for each in played.values())) for k in sampled]

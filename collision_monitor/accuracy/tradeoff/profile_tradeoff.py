@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from collision_monitor.accuracy.playback import Step, play
+from collision_monitor.accuracy.playback import Step, play_steps
 from collision_monitor.accuracy.reference_monitor import ReferenceMonitor
 from collision_monitor.accuracy.reported import Reported
 from collision_monitor.accuracy.scope import compared, unfiltered
@@ -19,7 +19,7 @@ from collision_monitor.errors import InputError
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.state.timeline import NANOSECOND
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.session.history.alarms import Contacts
+from collision_monitor.session.history.alarms import CertainContacts
 from collision_monitor.settings.profile import Profile
 
 REFERENCE = "exact"
@@ -40,14 +40,14 @@ def exact_answers(
     most_seconds: time of the steps after which the others are left out.
     """
     exact = Profile.named(REFERENCE).replace(uncertainty=False, **compared(profile))
-    answers = play(ReferenceMonitor(exact), described, steps, progress, most_seconds).answers
+    answers = play_steps(ReferenceMonitor(exact), described, steps, progress, most_seconds).answers
     return Reported.of(answers), len(answers)
 
 
-def contacts_of(steps: Sequence[Step], truth: Reported, horizon: float) -> Contacts:
+def contacts_of(steps: Sequence[Step], truth: Reported, horizon: float) -> CertainContacts:
     """Return the contacts among the exact answers to all steps, which judge the alarms of profiles."""
     times = np.maximum.accumulate([stamp for stamp, _ in steps]) * NANOSECOND
-    return Contacts.of(times, truth.contacts, truth.contact_step, horizon)
+    return CertainContacts.of(times, truth.contacts, truth.contact_step, horizon)
 
 
 def measure_profile(
@@ -55,7 +55,7 @@ def measure_profile(
     steps: Sequence[Step],
     profile: Profile,
     truth: Reported,
-    contacts: Contacts,
+    contacts: CertainContacts,
     *,
     first: int = 0,
     most_seconds: float = inf,
@@ -68,7 +68,7 @@ def measure_profile(
     first: place of the first of these steps among those of `contacts`. most_seconds: time of the steps, after which
     the others are left out.
     """
-    played = play(Monitor(unfiltered(profile), warns=False), described, steps, progress, most_seconds)
+    played = play_steps(Monitor(unfiltered(profile), warns=False), described, steps, progress, most_seconds)
     count = len(played.answers)
     if count < len(steps):
         truth = truth.until(count)
@@ -93,7 +93,7 @@ def profile_tradeoff(
         raise InputError(f"scene {scene}: expected at least one step, there is none")
     described = list(descriptions)
     rows = []
-    truths: dict[tuple[Any, ...], tuple[Reported, Contacts]] = {}
+    truths: dict[tuple[Any, ...], tuple[Reported, CertainContacts]] = {}
     for each in profiles:
         profile = Profile.named(each) if isinstance(each, str) else each
         key = tuple(compared(profile).values())

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 
 from collision_monitor.accuracy.inputs import Workload
-from collision_monitor.accuracy.playback import FEWEST_STEPS, play
+from collision_monitor.accuracy.playback import FEWEST_STEPS, play_steps
 from collision_monitor.accuracy.tradeoff.measurement import Measurement
 from collision_monitor.accuracy.tradeoff.profile_tradeoff import Progress, contacts_of, exact_answers, measure_profile
 from collision_monitor.accuracy.tuning.candidates import ANY_ERROR, Space, models_of
@@ -115,12 +115,12 @@ def _load_kernels(work: Workload, settings: Sequence[Profile]) -> None:
     ids = [each.object_id for each in few]
     steps = [(stamp, states[np.isin(states["id"], ids)]) for stamp, states in work.steps[:FEWEST_STEPS]]
     for profile in settings:
-        play(Monitor(profile, warns=False), few, steps, lambda done: None)
+        play_steps(Monitor(profile, warns=False), few, steps, lambda done: None)
 
 
 def fixed_part(work: Workload) -> float:
     """Return the median time (µs) of a step with objects that ignore each other, so that no pair is examined."""
     alone = [replace(each, group=1, mask=2) for each in work.descriptions]
     fast = Monitor(Profile.named("fast"), warns=False)
-    played = play(fast, alone, work.steps, lambda done: None, SETTING_SECONDS / 3.0)
+    played = play_steps(fast, alone, work.steps, lambda done: None, SETTING_SECONDS / 3.0)
     return 1e6 * float(np.median(played.warm()[0]))

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.accuracy.playback import play
+from collision_monitor.accuracy.playback import play_steps
 from collision_monitor.accuracy.tradeoff.measurement import Measurement
 from collision_monitor.accuracy.tuning.candidates import Space, with_threads
 from collision_monitor.accuracy.tuning.tally import Tally
@@ -109,7 +109,7 @@ class Halving:
         described, steps = recording.described, recording.steps_of(self._order[0])
         runs: dict[Profile, list[NDArray[np.float64]]] = {each: [] for each in profiles}
         for profile in list(profiles) * ROUNDS:
-            played = play(Monitor(profile, warns=False), described, steps, lambda done: None, self._run_seconds)
+            played = play_steps(Monitor(profile, warns=False), described, steps, lambda done: None, self._run_seconds)
             runs[profile].append(played.warm()[0])
         for profile, found in runs.items():
             fewest = min(map(len, found))

@@ -10,7 +10,7 @@ from typing import Final
 import numpy as np
 
 from collision_monitor.accuracy.inputs import Workload
-from collision_monitor.accuracy.playback import play
+from collision_monitor.accuracy.playback import play_steps
 from collision_monitor.accuracy.tradeoff.profile_tradeoff import exact_answers
 from collision_monitor.accuracy.tuning.candidates import FACTORS, Space
 from collision_monitor.accuracy.tuning.halving import FINALISTS, HOPS, ROUNDS, rungs_of
@@ -47,7 +47,7 @@ def plan_search(work: Workload, space: Space, jobs: int) -> SearchPlan:
     begin, own = time.perf_counter(), 0.0
     for profile in space.first_generation():
         if profile.name.partition(",")[0] in ("fast", f"balanced × {FACTORS[4]:g}", "exact"):
-            run = play(Monitor(profile, warns=False), work.descriptions, steps, lambda done: None, RUN_SECONDS)
+            run = play_steps(Monitor(profile, warns=False), work.descriptions, steps, lambda done: None, RUN_SECONDS)
             spent.append(float(np.median(run.warm()[0])))
             own += float(run.seconds.sum())
     describing = (time.perf_counter() - begin - own) / max(len(spent), 1)

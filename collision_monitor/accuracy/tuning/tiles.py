@@ -16,14 +16,14 @@ from typing import Any, Final, Self
 
 import numpy as np
 
-from collision_monitor.accuracy.playback import Step, play
+from collision_monitor.accuracy.playback import Step, play_steps
 from collision_monitor.accuracy.reported import Reported
 from collision_monitor.accuracy.scope import compared
 from collision_monitor.accuracy.tradeoff.profile_tradeoff import Progress, contacts_of, exact_answers, measure_profile
 from collision_monitor.accuracy.tuning.tally import Tally
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.session.history.alarms import Contacts
+from collision_monitor.session.history.alarms import CertainContacts
 from collision_monitor.session.worker import begin_worker
 from collision_monitor.settings.profile import Profile
 
@@ -38,13 +38,13 @@ POLL: Final = 0.2
 
 
 @dataclass(frozen=True)
-class Recording:
+class TuningInputs:
     """What a process needs: the objects, the steps, the first step of each tile, and the contacts of all steps."""
 
     described: list[ObjectDescription]
     steps: list[Step]
     begins: list[int]
-    contacts: dict[float, Contacts]
+    contacts: dict[float, CertainContacts]
     """By the horizon (s) that judges alarms."""
     _truths: dict[tuple[Any, ...], Reported] = field(default_factory=dict, init=False, compare=False)
 
@@ -59,7 +59,7 @@ class Recording:
         begins = np.linspace(0, len(steps), tiles_of(len(steps)) + 1).astype(int).tolist()
         none = {"horizon": 0.0, "horizon_by_name": "", "uncertainty": False}
         plain = Profile(name="contacts", **compared(profile) | none)
-        truth = Reported.of(play(Monitor(plain, warns=False), described, steps, lambda done: None).answers)
+        truth = Reported.of(play_steps(Monitor(plain, warns=False), described, steps, lambda done: None).answers)
         return cls(described, steps, begins, {each: contacts_of(steps, truth, each) for each in horizons})
 
     @property
@@ -107,7 +107,7 @@ def tiles_of(steps: int) -> int:
 class Workers:
     """Processes that measure profiles on tiles. With one job the work runs in this process."""
 
-    def __init__(self, recording: Recording, jobs: int, pool: Executor | None, done: Any) -> None:
+    def __init__(self, recording: TuningInputs, jobs: int, pool: Executor | None, done: Any) -> None:
         self.recording, self.jobs = recording, jobs
         self._pool, self._done = pool, done
 
@@ -133,7 +133,7 @@ class Workers:
 
 
 @contextmanager
-def workers(recording: Recording, jobs: int | None = None) -> Iterator[Workers]:
+def workers(recording: TuningInputs, jobs: int | None = None) -> Iterator[Workers]:
     """Start processes that have the recording: one for each core, but not more than tiles."""
     jobs = min(jobs or len(os.sched_getaffinity(0)), recording.tiles)
     if jobs <= 1:
@@ -151,7 +151,7 @@ def workers(recording: Recording, jobs: int | None = None) -> Iterator[Workers]:
 _taken: dict[str, Any] = {}
 
 
-def _take(recording: Recording, done: Any) -> None:
+def _take(recording: TuningInputs, done: Any) -> None:
     begin_worker()
     _taken.update(recording=recording, done=done)
 

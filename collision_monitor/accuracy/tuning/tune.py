@@ -14,7 +14,7 @@ from collision_monitor.accuracy.tuning.candidates import Space, models_of
 from collision_monitor.accuracy.tuning.demands import Demands
 from collision_monitor.accuracy.tuning.halving import Halving, Trial
 from collision_monitor.accuracy.tuning.search_time import RUN_SECONDS, runs_of
-from collision_monitor.accuracy.tuning.tiles import Recording, workers
+from collision_monitor.accuracy.tuning.tiles import TuningInputs, workers
 from collision_monitor.settings.parameter_file import PARAMETER_SECTION
 from collision_monitor.settings.profile import Profile
 
@@ -61,7 +61,7 @@ def tune(
     """
     recorded = space.recorded
     horizons = sorted({space.horizon, recorded.horizon})
-    recording = Recording.cut(work.descriptions, work.steps, recorded, horizons)
+    recording = TuningInputs.cut(work.descriptions, work.steps, recorded, horizons)
     with ExitStack() as stack:
         team = stack.enter_context(workers(recording, jobs))
         progress = stack.enter_context(progress_bar(work.name, runs_of(space, recording.tiles, team.jobs)))

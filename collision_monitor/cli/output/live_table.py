@@ -21,7 +21,7 @@ _RECORDING = {0: "not recording", 1: "recording", 2: "RECORDING FAILED"}
 
 
 @dataclass(frozen=True)
-class Picture:
+class LatestAnswers:
     """Newest messages of the monitor, `elapsed` s after its first answer. None: no message received yet."""
 
     title: str

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from collision_monitor.errors import InputError, ShapeError
 from collision_monitor.geometry.bounding_volumes import Aabb, BoundingSphere, Kdop, Obb
 from collision_monitor.geometry.coordinates import Array, Booleans, coordinates, point_set
-from collision_monitor.geometry.polygons import corners, is_convex
+from collision_monitor.geometry.polygons import is_convex, polygon_corners
 from collision_monitor.geometry.triangulation import triangulate
 from collision_monitor.tolerances import EPSILON, PARALLEL_SIN2, SAT_ROUND_OFF
 
@@ -23,7 +23,7 @@ PLANAR: Final = 1e-9
 polygon. Smaller: polygons that were rotated in float32 are refused."""
 
 
-def sphere_sphere(a: BoundingSphere, b: BoundingSphere) -> Booleans:
+def spheres_overlap(a: BoundingSphere, b: BoundingSphere) -> Booleans:
     """Whether spheres overlap: distance of the centres <= sum of the radii, squared to avoid the root.
 
     (Slides "Collisions Detection Between Spheres", "Sphere vs. Sphere")
@@ -35,7 +35,7 @@ def circle_circle(a: BoundingSphere, b: BoundingSphere) -> Booleans:
     """Whether circles overlap: sphere_sphere with centres (..., 2). (Slide "Collisions Detection Between Circles")"""
     coordinates(a.center, "circle a: center", 2)
     coordinates(b.center, "circle b: center", 2)
-    return sphere_sphere(a, b)
+    return spheres_overlap(a, b)
 
 
 def aabb_aabb(a: Aabb, b: Aabb) -> Booleans:
@@ -113,7 +113,7 @@ def obb_polygon(box: Obb, polygon: ArrayLike) -> bool:
         raise ShapeError("polygon: expected corners in one plane; split it into triangles")
     along = np.abs(normal).argmax()
     flat = np.delete(offset, along, axis=1)
-    parts = [corners(flat)] if is_convex(flat) else list(triangulate(flat))
+    parts = [polygon_corners(flat)] if is_convex(flat) else list(triangulate(flat))
     return any(_box_meets_convex(box.half_extents, p_B[part], normal) for part in parts)
 
 

@@ -12,8 +12,8 @@ from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.coordinates import Array, Indices, coordinates, point_set
 from collision_monitor.geometry.lines import segments_intersect
 from collision_monitor.geometry.orientation import orient2d
-from collision_monitor.geometry.point_in_polygon import Location, locate
-from collision_monitor.geometry.polygons import corners, is_convex, is_counter_clockwise
+from collision_monitor.geometry.point_in_polygon import Location, locate_in_polygon
+from collision_monitor.geometry.polygons import is_convex, is_counter_clockwise, polygon_corners
 
 
 class Evidence(Enum):
@@ -27,7 +27,7 @@ class Evidence(Enum):
 
 def contained_vertices(a: ArrayLike, b: ArrayLike) -> Indices:
     """Indices of the corners of polygon a (n, 2) that are in the simple polygon b or on its boundary, exactly."""
-    return np.flatnonzero(locate(point_set(a, "polygon", 2, least=3), b) != Location.OUTSIDE)
+    return np.flatnonzero(locate_in_polygon(point_set(a, "polygon", 2, least=3), b) != Location.OUTSIDE)
 
 
 def crossing_edge_pairs(a: ArrayLike, b: ArrayLike) -> Indices:
@@ -108,5 +108,5 @@ def _counter_clockwise(points: ArrayLike) -> Array:
     polygon = point_set(points, "polygon", 2, least=3)
     if not is_convex(polygon):
         raise ShapeError("polygon: SAT is for convex polygons; split this one with triangulation.convex_parts")
-    polygon = polygon[corners(polygon)]
+    polygon = polygon[polygon_corners(polygon)]
     return polygon if is_counter_clockwise(polygon) else polygon[::-1]

@@ -37,7 +37,7 @@ _AXES: Final = np.array([sign * np.array(d) / np.linalg.norm(d) for d in KDOP_DI
 _OCTANTS: Final = np.array(list(product((-0.25, 0.25), repeat=3)))
 
 
-class Level(NamedTuple):
+class SphereLevel(NamedTuple):
     """Spheres that together enclose the shape, and balls inside it: centers (n, 3) and radii (n,) in m.
 
     A ball of radius 0 is a point of the shape. parent (n,): index of the sphere's parent in the level before.
@@ -50,11 +50,11 @@ class Level(NamedTuple):
     parent: Indices
 
 
-SphereTree = tuple[Level, ...]
+SphereTree = tuple[SphereLevel, ...]
 """Levels from a single sphere to the finest level."""
 
 
-class Interval(NamedTuple):
+class DistanceInterval(NamedTuple):
     """Interval of the signed distance: at least lower and at most upper (m)."""
 
     lower: float
@@ -76,15 +76,15 @@ def sphere_tree(vertices: ArrayLike, faces: ArrayLike, depth: int = 5) -> Sphere
     closed = is_closed(faces)
     center, parent = np.array([0.5 * low + 0.5 * high]), np.zeros(1, np.int64)
     owner, face = np.zeros(len(faces), np.int64), np.arange(len(faces))  # faces that may be nearest to each cell
-    levels: list[Level] = []
-    carried: Level | None = None  # cells that are entirely inside, which are not split
+    levels: list[SphereLevel] = []
+    carried: SphereLevel | None = None  # cells that are entirely inside, which are not split
     while len(center) and len(levels) <= depth:  # at most DEEPEST + 1 turns
         nearest, distance, apart = _nearest(center, corners, owner, face)
         inside = np.zeros(len(center), bool)
         if closed:
             inside = locate_in_polyhedron(center, vertices, faces) >= Location.BOUNDARY
         reach = np.sqrt(0.75) * width * (1.0 + ROUNDED_UP)
-        level = Level(
+        level = SphereLevel(
             center=center,
             radius=np.full(len(center), reach),
             inner_center=np.where(inside[:, None], center, nearest),
@@ -113,12 +113,12 @@ def sphere_tree(vertices: ArrayLike, faces: ArrayLike, depth: int = 5) -> Sphere
     return _with_best_balls(_sorted(levels))
 
 
-def _chosen(level: Level, which: Booleans | Indices) -> Level:
-    return Level._make(field[which] for field in level)
+def _chosen(level: SphereLevel, which: Booleans | Indices) -> SphereLevel:
+    return SphereLevel._make(field[which] for field in level)
 
 
-def _joined(level: Level, other: Level) -> Level:
-    return Level._make(np.concatenate(pair) for pair in zip(level, other, strict=True))
+def _joined(level: SphereLevel, other: SphereLevel) -> SphereLevel:
+    return SphereLevel._make(np.concatenate(pair) for pair in zip(level, other, strict=True))
 
 
 def _nearest(points: Array, corners: Array, owner: Indices, face: Indices) -> tuple[Array, Array, Array]:
@@ -137,7 +137,7 @@ def _nearest(points: Array, corners: Array, owner: Indices, face: Indices) -> tu
     return closest[hits[np.searchsorted(owner[hits], every)]], distance, apart
 
 
-def _sorted(levels: list[Level]) -> list[Level]:
+def _sorted(levels: list[SphereLevel]) -> list[SphereLevel]:
     """Reorder the levels so that the spheres of one parent are contiguous."""
     place = np.zeros(1, np.int64)
     result = []
@@ -149,7 +149,7 @@ def _sorted(levels: list[Level]) -> list[Level]:
     return result
 
 
-def _with_best_balls(levels: list[Level]) -> SphereTree:
+def _with_best_balls(levels: list[SphereLevel]) -> SphereTree:
     """Give each sphere the largest ball among its own and those of its descendants."""
     for upper, lower in zip(levels[-2::-1], levels[:0:-1], strict=True):
         order = np.lexsort((-lower.inner_radius, lower.parent))
@@ -161,7 +161,7 @@ def _with_best_balls(levels: list[Level]) -> SphereTree:
     return tuple(levels)
 
 
-def distance_intervals(a: SphereTree, pose_a: Pose, b: SphereTree, pose_b: Pose) -> Iterator[Interval]:
+def distance_intervals(a: SphereTree, pose_a: Pose, b: SphereTree, pose_b: Pose) -> Iterator[DistanceInterval]:
     """Intervals of the signed distance after each level, ever narrower; stop when one is narrow enough.
 
     If the trees are apart, the lower end is the least distance of two spheres and the upper end that of two inner
@@ -188,7 +188,7 @@ def distance_intervals(a: SphereTree, pose_a: Pose, b: SphereTree, pose_b: Pose)
         axes = _AXES if apart[best] == 0.0 else np.vstack([_AXES, between[best] / apart[best]])
         gaps = (B @ axes.T - level_b.radius[:, None]).min(axis=0) - (A @ axes.T + level_a.radius[:, None]).max(axis=0)
         lower = max(lower, float(gaps.max()) - slack)
-        yield Interval(lower, upper)
+        yield DistanceInterval(lower, upper)
         near = outer <= upper + slack
         i, j = i[near], j[near]
         # no pair is left if two balls overlap more deeply than any two finer spheres

@@ -14,14 +14,14 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from collision_monitor._jit import device
-from collision_monitor._jit.lanes import Lanes, load, store
+from collision_monitor._jit.lanes import Lanes, load_lanes, store
 from collision_monitor.meshes.advance.approach import Approach, time_until
 from collision_monitor.meshes.advance.box_times import curvature_until, times_open
 from collision_monitor.meshes.below import is_all_above_zero
 from collision_monitor.meshes.boxes import Block, inner
 from collision_monitor.meshes.distance.leaf_bounds import least_of_pairs
 from collision_monitor.meshes.distance.nearest import toward, triangle_at
-from collision_monitor.meshes.distance.triangle_pair import closest_points
+from collision_monitor.meshes.distance.triangle_pair import closest_triangle_points
 from collision_monitor.meshes.layout import CORNERS, RADIUS, WIDTH
 from collision_monitor.meshes.placing import Placing, place_triangle, turn_back
 from collision_monitor.narrow_phase.vector import Vector, cross, dot, minus, opposite
@@ -82,9 +82,9 @@ def _raise_times(typing_context, numbers, enough, work, other, times):
         fields = [Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[0])]
         gap, speed, bent, largest, change, bend, jerk, until = fields
         enough, array = Lanes.constant(builder, arguments[1]), (signature.args[2], arguments[2])
-        far, forth, curving, reach = (load(context, builder, *array, arguments[3], WIDTH * k) for k in range(FACTS))
+        far, forth, curving, reach = (load_lanes(context, builder, *array, arguments[3], WIDTH * k) for k in range(FACTS))
         curvature = curvature_until(until, largest + bend * reach, bent + curving, change + jerk * reach)
-        gap, speed, known = gap - far, speed + forth, load(context, builder, *array, arguments[4])
+        gap, speed, known = gap - far, speed + forth, load_lanes(context, builder, *array, arguments[4])
         rest = gap - enough * (speed + enough * curvature * Lanes.constant(builder, 0.5))
         # with a curvature of at least 0, a gap that is open now and at the end of a time is open within it; NaN is not
         with builder.if_else(is_all_above_zero(gap.least(rest)), likely=True) as (open_, closing):
@@ -158,7 +158,7 @@ def leaf_time(
             seen |= 1 << pair
             i, j = pair // WIDTH, pair % WIDTH
             T = place_triangle(X, triangle_at(blocks_b, leaf_b, j))
-            found = closest_points(triangle_at(blocks_a, leaf_a, i), T)
+            found = closest_triangle_points(triangle_at(blocks_a, leaf_a, i), T)
             length = sqrt(found.squared)
             gap = length - blocks_a[leaf_a, RADIUS, i] - blocks_b[leaf_b, RADIUS, j] - move.start
             if gap <= tolerance or length == 0.0:

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import inlined, kernel, outlined
-from collision_monitor.meshes.distance.nearest import LEAST, MOST_PAIRS, ON_A, ON_B, PLACE_A, nearest
+from collision_monitor.meshes.distance.nearest import LEAST, MOST_PAIRS, ON_A, ON_B, PLACE_A, nearest_triangles
 from collision_monitor.meshes.layout import AXES, CENTER, HALF, RADIUS, REACH, WIDTH
 from collision_monitor.meshes.overlap.inside import INSIDE, UNKNOWN, is_either_in
-from collision_monitor.meshes.overlap.touching import deepest, touching
+from collision_monitor.meshes.overlap.touching import deepest_touching, touching_triangles
 from collision_monitor.meshes.placing import relative
 from collision_monitor.narrow_phase.contact_row import write
 from collision_monitor.narrow_phase.pair_pose import PairPose
@@ -33,7 +33,7 @@ def reach_in(blocks: Any, root: int) -> float:
     return blocks[root, REACH, 1]
 
 
-def reach_of(tree: NDArray[np.float64]) -> float:
+def tree_reach(tree: NDArray[np.float64]) -> float:
     """Distance (m) of the farthest point of a tree from its origin."""
     return float(tree[0, REACH, 1])
 
@@ -58,11 +58,11 @@ def tree_contact(
     X = relative(pose.R_A, pose.R_B, pose.p)
     round_off = SAT_ROUND_OFF * (reach_in(blocks_a, root_a) + reach_in(blocks_b, root_b) + sum_of_sizes(pose.p))
     # beyond the limit by round-off, because a search for less than 0 would find no surfaces that touch
-    distance = nearest(blocks_a, root_a, blocks_b, root_b, X, limit + round_off, answer, work)
+    distance = nearest_triangles(blocks_a, root_a, blocks_b, root_b, X, limit + round_off, answer, work)
     if distance == 0.0:
-        count, _ = touching(blocks_a, root_a, blocks_b, root_b, X, MOST_PAIRS, work)
+        count, _ = touching_triangles(blocks_a, root_a, blocks_b, root_b, X, MOST_PAIRS, work)
         if count > 0:
-            depth, n, on_a = deepest(blocks_a, blocks_b, X, work, count, answer)
+            depth, n, on_a = deepest_touching(blocks_a, blocks_b, X, work, count, answer)
         else:  # round-off says so of the distance alone
             depth, n, on_a = 0.0, FACE_TO_FACE, (answer[ON_A], answer[ON_A + 1], answer[ON_A + 2])
         write(out, -depth, rotate(pose.R_A, n), rotate(pose.R_A, on_a), round_off)
@@ -76,7 +76,7 @@ def tree_contact(
     if distance == inf:
         if known == APART and answer[LEAST] == inf:
             return FARTHER
-        distance = nearest(blocks_a, root_a, blocks_b, root_b, X, inf, answer, work)
+        distance = nearest_triangles(blocks_a, root_a, blocks_b, root_b, X, inf, answer, work)
     on_a, on_b = (answer[ON_A], answer[ON_A + 1], answer[ON_A + 2]), (answer[ON_B], answer[ON_B + 1], answer[ON_B + 2])
     w = minus(on_b, on_a)
     length = sqrt(dot(w, w))

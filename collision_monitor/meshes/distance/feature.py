@@ -6,7 +6,7 @@ from math import inf, sqrt
 from typing import Any, Final
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.meshes.distance.triangle_pair import Triangle, normal
+from collision_monitor.meshes.distance.triangle_pair import Corners, normal
 from collision_monitor.narrow_phase.contact_row import EDGE, FACE, VERTEX
 from collision_monitor.narrow_phase.gjk import closest_on_triangle, weighted
 from collision_monitor.narrow_phase.vector import Vector, along, dot, minus
@@ -24,7 +24,7 @@ right angle to it; the vertex at the point; the edge or the face that contains i
 
 
 @inlined
-def tie_of(table: Any, a: int, b: int) -> float:
+def slot_tie(table: Any, a: int, b: int) -> float:
     """Largest difference of equal heights on one of two shapes, as a part of its size."""
     return ROUND_TIE if _is_curved(table.kind[a]) or _is_curved(table.kind[b]) else FEATURE_TIE
 
@@ -45,7 +45,7 @@ def off_segment(x: Vector, p: Vector, q: Vector) -> float:
 
 
 @inlined
-def off_triangle(x: Vector, T: Triangle) -> tuple[float, Vector]:
+def off_triangle(x: Vector, T: Corners) -> tuple[float, Vector]:
     """Squared distance of a point from a triangle (m^2), and the nearest point of it."""
     foot = weighted(closest_on_triangle(minus(T.a, x), minus(T.b, x), minus(T.c, x)), T.a, T.b, T.c)
     d = minus(foot, x)
@@ -53,7 +53,7 @@ def off_triangle(x: Vector, T: Triangle) -> tuple[float, Vector]:
 
 
 @device
-def feature_in_triangle(T: Triangle, x: Vector, n: Vector, reach: float) -> tuple[int, float, float]:
+def feature_in_triangle(T: Corners, x: Vector, n: Vector, reach: float) -> tuple[int, float, float]:
     """Rank, type (contact_row.py) and number of the feature of a triangle at a point x of it, for a normal n.
 
     Corner c has the number c, and so has the edge from there. reach (m): heights and distances up to it count as 0.
@@ -85,7 +85,7 @@ def feature_in_triangle(T: Triangle, x: Vector, n: Vector, reach: float) -> tupl
 
 
 @device
-def triangle_feature(T: Triangle, number: float, x: Vector, n: Vector, reach: float) -> tuple[float, float]:
+def triangle_feature(T: Corners, number: float, x: Vector, n: Vector, reach: float) -> tuple[float, float]:
     """Type and index of the feature of a triangle at the point that is nearest to x, for a normal n, in its frame.
 
     Face f (`number`) has the index f. Its corner c has 3 f + c, as in `faces.ravel()`, and so has its edge from that
@@ -97,7 +97,7 @@ def triangle_feature(T: Triangle, number: float, x: Vector, n: Vector, reach: fl
 
 
 @device
-def number_in_hull(table: Any, s: int, T: Triangle, kind: float, c: float, reach: float) -> float:
+def number_in_hull(table: Any, s: int, T: Corners, kind: float, c: float, reach: float) -> float:
     """Number of a feature of a hull: the lowest of its vertices. kind, c: of the feature in a triangle of the hull.
 
     A face is all vertices within `reach` (m) of the triangle's plane.

@@ -12,7 +12,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 
 from collision_monitor._jit import device, inlined
-from collision_monitor._jit.lanes import Lanes, load, store
+from collision_monitor._jit.lanes import Lanes, load_lanes, store
 from collision_monitor.meshes.boxes import Block, inner
 from collision_monitor.meshes.layout import CORNERS, RADIUS, WIDTH
 from collision_monitor.meshes.placing import Placing, turn_back
@@ -49,7 +49,7 @@ def _raise_bounds(typing_context, numbers, work, other, known, out):
     def codegen(context, builder, signature, arguments):
         least, gap = (Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[0]))
         array = signature.args[1], arguments[1]
-        far, before = (load(context, builder, *array, at) for at in arguments[2:4])
+        far, before = (load_lanes(context, builder, *array, at) for at in arguments[2:4])
         open_ = (gap - far).largest(Lanes.constant(builder, 0.0))
         store(context, builder, before.largest(least).largest(open_ * open_), *array, arguments[4])
         return context.get_dummy_value()
@@ -133,7 +133,7 @@ def _first_equal(typing_context, work, at, number):
 def _rows(context: Any, builder: Any, array_type: Any, arguments: Any) -> list[Lanes]:
     """The numbers of all pairs of triangles of two leaves, from an array (the first argument) and a place there."""
     array, at = arguments[:2]
-    return [load(context, builder, array_type, array, at, row) for row in range(0, PAIRS_OF_LEAVES, WIDTH)]
+    return [load_lanes(context, builder, array_type, array, at, row) for row in range(0, PAIRS_OF_LEAVES, WIDTH)]
 
 
 @inlined

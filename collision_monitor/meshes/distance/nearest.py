@@ -18,10 +18,10 @@ from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.meshes.below import boxes_below, count_of, first_of
 from collision_monitor.meshes.boxes import raise_by_gaps, triangle_bounds
 from collision_monitor.meshes.distance.leaf_bounds import farthest_along, least_of_pairs, raise_bounds
-from collision_monitor.meshes.distance.triangle_pair import Triangle, closest_points
+from collision_monitor.meshes.distance.triangle_pair import Corners, closest_triangle_points
 from collision_monitor.meshes.layout import CENTER, CHILD, CORNERS, FACE, HALF, RADIUS, WIDTH
 from collision_monitor.meshes.placing import inverse, place_point, place_triangle, relative, turn_back
-from collision_monitor.meshes.supports import reach_along, support_bounds
+from collision_monitor.meshes.supports import content_reach_along, support_bounds
 from collision_monitor.narrow_phase.vector import dot, minus, opposite
 from collision_monitor.tolerances import EPSILON
 
@@ -77,7 +77,7 @@ def answer_row() -> NDArray[np.float64]:
 @inlined
 def triangle_at(blocks, block, k):
     """Triangle k of a block."""
-    return Triangle(
+    return Corners(
         (blocks[block, CORNERS, k], blocks[block, CORNERS + 1, k], blocks[block, CORNERS + 2, k]),
         (blocks[block, CORNERS + 3, k], blocks[block, CORNERS + 4, k], blocks[block, CORNERS + 5, k]),
         (blocks[block, CORNERS + 6, k], blocks[block, CORNERS + 7, k], blocks[block, CORNERS + 8, k]),
@@ -169,7 +169,7 @@ def _bounds_of(blocks_a, a, i, blocks_b, block, X, n, u, limit, work):
 
     n, u: unit directions from A to B, in A's frame. limit: bounds above it are as good as any (m^2).
     """
-    gaps = _shift(X, n) - reach_along(blocks_a, a, i, n), _shift(X, u) - reach_along(blocks_a, a, i, u)
+    gaps = _shift(X, n) - content_reach_along(blocks_a, a, i, n), _shift(X, u) - content_reach_along(blocks_a, a, i, u)
     support_bounds(opposite(turn_back(X, n)), opposite(turn_back(X, u)), gaps, blocks_b, block, work, BOUNDS)
     if limit < inf and count_of(boxes_below(limit, work, BOUNDS, blocks_b, block)) >= MANY:
         raise_by_gaps(blocks_a, a, i, blocks_b, block, X, work, BOUNDS)
@@ -204,7 +204,7 @@ def _leaf_pair(blocks_a, a, i, leaf_a, blocks_b, b, j, leaf_b, X, n, best, answe
         work[BETWEEN + pair] = inf
         k, m = pair // WIDTH, pair % WIDTH
         T = place_triangle(X, triangle_at(blocks_b, leaf_b, m))
-        found = closest_points(triangle_at(blocks_a, leaf_a, k), T)
+        found = closest_triangle_points(triangle_at(blocks_a, leaf_a, k), T)
         distance = max(sqrt(found.squared) - blocks_a[leaf_a, RADIUS, k] - blocks_b[leaf_b, RADIUS, m], 0.0)
         if distance < best:
             best = distance
@@ -220,7 +220,7 @@ def _leaf_pair(blocks_a, a, i, leaf_a, blocks_b, b, j, leaf_b, X, n, best, answe
 
 
 @device
-def nearest(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work):
+def nearest_triangles(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work):
     """Write the nearest triangles of two trees to the answer if they are nearer than `limit` (m); return the distance.
 
     blocks_a, root_a: the array of a tree and its block 0 there. X (Placing): pose of B in A's frame. answer: may hold
@@ -231,7 +231,7 @@ def nearest(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work):
     if answer[PLACE_A] >= 0.0:
         a, b = int(answer[PLACE_A]), int(answer[PLACE_B])
         S = triangle_at(blocks_a, a // WIDTH, a % WIDTH)
-        closest = closest_points(S, place_triangle(X, triangle_at(blocks_b, b // WIDTH, b % WIDTH)))
+        closest = closest_triangle_points(S, place_triangle(X, triangle_at(blocks_b, b // WIDTH, b % WIDTH)))
         radius = blocks_a[a // WIDTH, RADIUS, a % WIDTH] + blocks_b[b // WIDTH, RADIUS, b % WIDTH]
         distance = max(sqrt(closest.squared) - radius, 0.0)
         if distance < best:
@@ -283,4 +283,4 @@ def nearest(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work):
 def tree_distance(tree_a, R_a, p_a, tree_b, R_b, p_b, limit, answer, work):
     """`nearest` of two trees at poses given by rotations (3, 3) and positions (3,) (m)."""
     p = p_b[0] - p_a[0], p_b[1] - p_a[1], p_b[2] - p_a[2]
-    return nearest(tree_a, 0, tree_b, 0, relative(R_a, R_b, p), limit, answer, work)
+    return nearest_triangles(tree_a, 0, tree_b, 0, relative(R_a, R_b, p), limit, answer, work)

@@ -15,10 +15,10 @@ from collision_monitor._jit.vectors import LANES
 from collision_monitor.meshes.advance.approach import Approach, time_until
 from collision_monitor.meshes.boxes import half_of
 from collision_monitor.meshes.distance.contact import reach_in
-from collision_monitor.meshes.distance.feature import tie_of, triangle_feature
+from collision_monitor.meshes.distance.feature import slot_tie, triangle_feature
 from collision_monitor.meshes.distance.nearest import NEAR_A, triangle_at
 from collision_monitor.meshes.distance.point_solid import point_distance
-from collision_monitor.meshes.distance.triangle_pair import Triangle
+from collision_monitor.meshes.distance.triangle_pair import Corners
 from collision_monitor.meshes.layout import CENTER, CHILD, FACE, RADIUS, WIDTH
 from collision_monitor.meshes.overlap.touching import repeats
 from collision_monitor.meshes.placing import Placing, inverse, place_point, relative, turn_back, turned_back
@@ -66,7 +66,7 @@ class SolidMemory(NamedTuple):
 
 
 @inlined
-def _middle(T: Triangle) -> tuple[Vector, float]:
+def _middle(T: Corners) -> tuple[Vector, float]:
     """Centre of a sphere about a triangle, and its radius (m)."""
     third = 1.0 / 3.0
     c = (
@@ -95,14 +95,14 @@ def center_of(blocks: Any, block: int, k: int) -> Vector:
 
 
 @inlined
-def reach_along(blocks: Any, block: int, k: int, n: Vector) -> float:
+def box_reach_along(blocks: Any, block: int, k: int, n: Vector) -> float:
     """How far a box reaches from its centre along n, of any length, in the frame of its tree (m)."""
     e, m = half_of(blocks, block, k), turned_back(blocks, block, k, n)
     return abs(m[0]) * e[0] + abs(m[1]) * e[1] + abs(m[2]) * e[2]
 
 
 @inlined
-def _is_point(T: Triangle) -> bool:
+def _is_point(T: Corners) -> bool:
     return (
         T.a[0] == T.b[0] and T.a[1] == T.b[1] and T.a[2] == T.b[2]
         and T.a[0] == T.c[0] and T.a[1] == T.c[1] and T.a[2] == T.c[2]
@@ -138,8 +138,8 @@ def _point_contact(
 
 
 @device
-def triangle_contact(
-    table: Any, b: int, pose: PairPose, T: Triangle, radius: float, limit: float, out: Any, memory: SolidMemory
+def triangle_solid_contact(
+    table: Any, b: int, pose: PairPose, T: Corners, radius: float, limit: float, out: Any, memory: SolidMemory
 ) -> bool:
     """Write the contact of a triangle of A, enlarged by a radius, and the solid b; False if beyond the limit."""
     if table.kind[b] == HALF_SPACE:
@@ -200,7 +200,7 @@ def solid_contact(
                 c = center_of(blocks, block, k)
                 bound, n, _ = point_distance(table, b, place_point(Y, c))
                 n = minus(place_point(X, n), (X.x, X.y, X.z))
-                bound -= reach_along(blocks, block, k, n) + margin + table.margin[b]
+                bound -= box_reach_along(blocks, block, k, n) + margin + table.margin[b]
                 if bound <= enough:
                     push_box(work, first, waiting, bound, float(WIDTH * block + k))
                     waiting += 1
@@ -215,7 +215,7 @@ def solid_contact(
                 continue
             examined += 1
             within = inf if examined > MOST_EXAMINED and not found else best
-            is_near = triangle_contact(table, b, pose, T, radius, within, row, memory)
+            is_near = triangle_solid_contact(table, b, pose, T, radius, within, row, memory)
             if is_near and (not found or row[DISTANCE] < best):
                 best, found, enough = row[DISTANCE], True, row[DISTANCE] - row[BOUND]
                 for i in range(CONTACT_SIZE):
@@ -225,7 +225,7 @@ def solid_contact(
                 else:
                     n = rotate_back(pose.R_A, (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2]))
                     x = rotate_back(pose.R_A, (row[POINT_A], row[POINT_A + 1], row[POINT_A + 2]))
-                    reach = tie_of(table, b, b) * reach_in(blocks, root)
+                    reach = slot_tie(table, b, b) * reach_in(blocks, root)
                     out[FEATURE_TYPE_A], out[FEATURE_TYPE_A + 1] = triangle_feature(
                         T, blocks[block, FACE, k], along(x, -radius, n), n, reach
                     )
@@ -273,7 +273,7 @@ def box_time(blocks: Any, block: int, k: int, solid: MovingSolid) -> float:
     """Time until which a box of the tree stays apart from the solid."""
     c, e = center_of(blocks, block, k), half_of(blocks, block, k)
     bound, n = _distance_along(solid, c)
-    gap, turn = bound - reach_along(blocks, block, k, n), reach_along(blocks, block, k, cross(n, solid.move.w_a))
+    gap, turn = bound - box_reach_along(blocks, block, k, n), box_reach_along(blocks, block, k, cross(n, solid.move.w_a))
     X, move = solid.X, solid.move
     return solid_time(solid.table, solid.b, X, n, gap - move.start, c, sqrt(dot(e, e)), turn, move)
 
@@ -300,7 +300,7 @@ def leaf_solid_time(
         across = cross(n, move.w_a)
         turn = size * sqrt(dot(across, across))
         time = solid_time(table, b, X, n, bound - size - radius - move.start, c, size, turn, move)
-        if time < min(soon, enough) and triangle_contact(table, b, pose, T, radius, inf, row, memory):
+        if time < min(soon, enough) and triangle_solid_contact(table, b, pose, T, radius, inf, row, memory):
             examined += 1
             gap = row[DISTANCE] - row[BOUND] - start
             if gap <= tolerance:

@@ -12,7 +12,13 @@ from typing import Any, Final
 from collision_monitor._jit import inlined, outlined
 from collision_monitor.meshes.distance.nearest import NEAR_A, triangle_at
 from collision_monitor.meshes.distance.point_range import point_range
-from collision_monitor.meshes.distance.solid import SolidMemory, center_of, push_box, reach_along, triangle_contact
+from collision_monitor.meshes.distance.solid import (
+    SolidMemory,
+    box_reach_along,
+    center_of,
+    push_box,
+    triangle_solid_contact,
+)
 from collision_monitor.meshes.layout import CHILD, RADIUS, WIDTH
 from collision_monitor.meshes.overlap.touching import repeats
 from collision_monitor.meshes.placing import inverse, place_point, relative
@@ -63,7 +69,7 @@ def solid_range(
                     continue
                 lower, _, n = point_range(table, b, place_point(Y, center_of(blocks, block, k)))
                 n = minus(place_point(X, n), (X.x, X.y, X.z))
-                lower -= reach_along(blocks, block, k, n) + margin + table.margin[b]
+                lower -= box_reach_along(blocks, block, k, n) + margin + table.margin[b]
                 if lower <= 0.0:
                     push_box(work, first, waiting, lower, float(WIDTH * block + k))
                     waiting += 1
@@ -83,7 +89,7 @@ def solid_range(
                 examined += 1
                 if examined > MOST_EXAMINED:
                     return -inf, inf
-                if not triangle_contact(table, b, pose, T, radius, 0.0, row, memory):
+                if not triangle_solid_contact(table, b, pose, T, radius, 0.0, row, memory):
                     continue
                 lower, upper = row[DISTANCE] - row[BOUND], row[DISTANCE]
                 if upper < most:

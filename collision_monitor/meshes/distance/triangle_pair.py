@@ -15,7 +15,7 @@ from collision_monitor.narrow_phase.vector import along, cross, dot, minus, sum_
 from collision_monitor.tolerances import SAT_ROUND_OFF, SEGMENT_PARALLEL_SIN2
 
 
-class Triangle(NamedTuple):
+class Corners(NamedTuple):
     """Corners (m)."""
 
     a: Any
@@ -126,7 +126,7 @@ def corner(S, k):
 
 
 @device
-def closest_points(S, T):
+def closest_triangle_points(S, T):
     """Closest points of two triangles (Closest)."""
     best, on_s, on_t = inf, S.a, T.a
     for i in range(3):

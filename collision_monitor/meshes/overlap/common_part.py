@@ -6,7 +6,7 @@ from math import inf, sqrt
 from typing import Any, NamedTuple
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.meshes.distance.triangle_pair import Triangle, corner, normal
+from collision_monitor.meshes.distance.triangle_pair import Corners, corner, normal
 from collision_monitor.narrow_phase.vector import Vector, along, cross, direction, dot, minus, plus, scaled
 
 
@@ -23,14 +23,14 @@ class CommonPart(NamedTuple):
 
 
 @inlined
-def normal_of(T: Triangle) -> Vector:
+def normal_of(T: Corners) -> Vector:
     """Unit normal of a triangle, +z for a flat one."""
     _, n = direction(normal(T))
     return n
 
 
 @inlined
-def _inward(T: Triangle, k: int, n: Vector) -> tuple[Vector, Vector]:
+def _inward(T: Corners, k: int, n: Vector) -> tuple[Vector, Vector]:
     """Corner k of a triangle, and the unit vector across the edge from it, into the triangle; n: its unit normal."""
     a = corner(T, k)
     _, side = direction(cross(n, minus(corner(T, (k + 1) % 3), a)))
@@ -38,7 +38,7 @@ def _inward(T: Triangle, k: int, n: Vector) -> tuple[Vector, Vector]:
 
 
 @inlined
-def _over(p: Vector, d: Vector, T: Triangle, n: Vector, slack: float) -> tuple[float, float]:
+def _over(p: Vector, d: Vector, T: Corners, n: Vector, slack: float) -> tuple[float, float]:
     """First and last s in [0, 1] for which p + s d is over a triangle enlarged by the slack (m); none if first > last.
 
     n: its unit normal. (Cyrus and Beck, Generalized two- and three-dimensional clipping, 1978)
@@ -57,20 +57,20 @@ def _over(p: Vector, d: Vector, T: Triangle, n: Vector, slack: float) -> tuple[f
 
 
 @inlined
-def _is_in_plane(S: Triangle, x: Vector, n: Vector, slack: float) -> bool:
+def _is_in_plane(S: Corners, x: Vector, n: Vector, slack: float) -> bool:
     """Whether the corners of a triangle are at most the slack (m) from a plane through x with a unit normal."""
     a, b, c = dot(minus(S.a, x), n), dot(minus(S.b, x), n), dot(minus(S.c, x), n)
     return max(abs(a), max(abs(b), abs(c))) <= slack
 
 
 @inlined
-def is_flat(S: Triangle, T: Triangle, n: Vector, m: Vector, slack: float) -> bool:
+def is_flat(S: Corners, T: Corners, n: Vector, m: Vector, slack: float) -> bool:
     """Whether two triangles with these unit normals are in one plane, but for the slack (m)."""
     return _is_in_plane(S, T.a, m, slack) and _is_in_plane(T, S.a, n, slack)
 
 
 @device
-def common_part(S: Triangle, T: Triangle, n: Vector, m: Vector, slack: float) -> CommonPart:
+def common_part(S: Corners, T: Corners, n: Vector, m: Vector, slack: float) -> CommonPart:
     """`CommonPart` of two triangles with these unit normals that are at most the slack (m) apart.
 
     Its corners are where edges of one leave the other, or pass through it.

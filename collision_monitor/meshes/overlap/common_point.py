@@ -13,7 +13,7 @@ from collision_monitor._jit import device, inlined
 from collision_monitor.meshes.distance.nearest import PAIRS, triangle_at
 from collision_monitor.meshes.layout import CLOSED, WIDTH
 from collision_monitor.meshes.overlap.common_part import common_part, is_flat, normal_of
-from collision_monitor.meshes.overlap.inside import INSIDE, OUTSIDE, is_clear, locate
+from collision_monitor.meshes.overlap.inside import INSIDE, OUTSIDE, is_clear, locate_in_surface
 from collision_monitor.meshes.overlap.touching import nearly_touching
 from collision_monitor.meshes.placing import Placing, inverse, place_point, place_triangle
 from collision_monitor.narrow_phase.vector import Vector, along, direction, plus, scaled
@@ -91,9 +91,9 @@ def common_ball(
 def _is_ball_along(both: _Both, x: Vector, u: Vector, depth: float, radius: float, work: Any) -> bool:
     """Whether a ball in both solids is found along u from a point x where they touch, up to this depth (m)."""
     nearest = along(x, depth * LESS ** (DEPTHS - 1), u)
-    if locate(both.blocks, both.root_a, nearest, work) == OUTSIDE:
+    if locate_in_surface(both.blocks, both.root_a, nearest, work) == OUTSIDE:
         return False
-    if locate(both.blocks, both.root_b, place_point(both.Y, nearest), work) == OUTSIDE:
+    if locate_in_surface(both.blocks, both.root_b, place_point(both.Y, nearest), work) == OUTSIDE:
         return False
     for _ in range(DEPTHS):
         y = along(x, depth, u)
@@ -107,4 +107,4 @@ def _is_ball_along(both: _Both, x: Vector, u: Vector, depth: float, radius: floa
 @device
 def _is_ball_in(blocks: Any, root: int, x: Vector, radius: float, work: Any) -> bool:
     """Whether a ball is certainly inside a closed surface."""
-    return locate(blocks, root, x, work) == INSIDE and is_clear(blocks, root, x, radius, work)
+    return locate_in_surface(blocks, root, x, work) == INSIDE and is_clear(blocks, root, x, radius, work)

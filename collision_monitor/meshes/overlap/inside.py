@@ -32,7 +32,7 @@ people build."""
 
 
 @device
-def locate(blocks: Any, root: int, x: Vector, work: Any) -> int:
+def locate_in_surface(blocks: Any, root: int, x: Vector, work: Any) -> int:
     """OUTSIDE or INSIDE for a point (m) in the frame of a closed surface; UNKNOWN if round-off leaves it open."""
     e = half_of(blocks, root, 0)
     c = blocks[root, CENTER, 0], blocks[root, CENTER + 1, 0], blocks[root, CENTER + 2, 0]
@@ -62,7 +62,7 @@ def is_in(blocks: Any, root: int, other: Any, other_root: int, X: Placing, clear
     for k in range(parts):
         block, member = first + k // WIDTH, k % WIDTH
         x = place_point(X, (other[block, 0, member], other[block, 1, member], other[block, 2, member]))
-        known = max(known, locate(blocks, root, x, work))
+        known = max(known, locate_in_surface(blocks, root, x, work))
         if known == INSIDE:
             return INSIDE
     return known
@@ -112,7 +112,7 @@ def _is_some_in(blocks: Any, root: int, other: Any, other_root: int, X: Placing,
             if located >= MOST_LOCATED:
                 return UNKNOWN
             located += 1
-            known = max(known, locate(blocks, root, place_point(X, x), work))
+            known = max(known, locate_in_surface(blocks, root, place_point(X, x), work))
             if known == INSIDE:
                 return INSIDE
     return known

@@ -18,7 +18,7 @@ from collision_monitor.meshes.distance.nearest import (
     push_nearest_last,
     triangle_at,
 )
-from collision_monitor.meshes.distance.triangle_pair import Triangle, closest_points, crossing_point
+from collision_monitor.meshes.distance.triangle_pair import Corners, closest_triangle_points, crossing_point
 from collision_monitor.meshes.layout import CHILD, FACE, RADIUS, WIDTH
 from collision_monitor.meshes.overlap.leaf_planes import may_cross, may_touch
 from collision_monitor.meshes.placing import inverse, place_triangle, relative
@@ -94,7 +94,7 @@ def _pairs_within(
 
 
 @device
-def touching(
+def touching_triangles(
     blocks_a: Any, root_a: int, blocks_b: Any, root_b: int, X: Any, most: int, work: Any
 ) -> tuple[int, bool]:
     """Find pairs of triangles that meet, `most` at most; return their number, and whether these are all.
@@ -117,16 +117,16 @@ def nearly_touching(
 
 
 @inlined
-def meet(S: Triangle, T: Triangle, radius: float) -> bool:
+def meet(S: Corners, T: Corners, radius: float) -> bool:
     """Whether two triangles, enlarged by this radius together, have a point in common."""
     if radius > 0.0:
-        return closest_points(S, T).squared <= radius * radius
+        return closest_triangle_points(S, T).squared <= radius * radius
     found, _ = crossing_point(S, T)
     return found
 
 
 @inlined
-def _overlap_along(S: Triangle, T: Triangle, axis: Vector) -> tuple[float, float]:
+def _overlap_along(S: Corners, T: Corners, axis: Vector) -> tuple[float, float]:
     """How far T has to move along the axis, or against it, to leave S; in units of the axis."""
     a, b, c = dot(S.a, axis), dot(S.b, axis), dot(S.c, axis)
     x, y, z = dot(T.a, axis), dot(T.b, axis), dot(T.c, axis)
@@ -136,7 +136,7 @@ def _overlap_along(S: Triangle, T: Triangle, axis: Vector) -> tuple[float, float
 
 
 @device
-def triangle_depth(S: Triangle, T: Triangle) -> tuple[float, Vector]:
+def triangle_depth(S: Corners, T: Corners) -> tuple[float, Vector]:
     """Length (m) and direction of the shortest translation of T that parts two triangles that meet.
 
     It is along the normal of one of them or at a right angle to an edge of each, as all faces of their difference are.
@@ -167,7 +167,7 @@ def triangle_depth(S: Triangle, T: Triangle) -> tuple[float, Vector]:
 
 
 @device
-def triangle_contact(S: Triangle, T: Triangle, radius: float) -> tuple[float, Vector, Vector]:
+def triangle_pair_depth(S: Corners, T: Corners, radius: float) -> tuple[float, Vector, Vector]:
     """Depth (m) of two triangles enlarged by this radius together, its direction from S to T, and a point on S.
 
     The depth is negative if they are apart.
@@ -175,9 +175,9 @@ def triangle_contact(S: Triangle, T: Triangle, radius: float) -> tuple[float, Ve
     crosses, _ = crossing_point(S, T)
     if crosses:
         depth, n = triangle_depth(S, T)
-        parted = Triangle(along(T.a, depth, n), along(T.b, depth, n), along(T.c, depth, n))
-        return depth + radius, n, closest_points(S, parted).on_a
-    found = closest_points(S, T)
+        parted = Corners(along(T.a, depth, n), along(T.b, depth, n), along(T.c, depth, n))
+        return depth + radius, n, closest_triangle_points(S, parted).on_a
+    found = closest_triangle_points(S, T)
     length = sqrt(found.squared)
     w = minus(found.on_b, found.on_a)
     n = (w[0] / length, w[1] / length, w[2] / length) if length > 0.0 else (0.0, 0.0, 1.0)
@@ -192,12 +192,12 @@ def contact_of_places(
     S = triangle_at(blocks_a, a // WIDTH, a % WIDTH)
     T = place_triangle(X, triangle_at(blocks_b, b // WIDTH, b % WIDTH))
     own = blocks_a[a // WIDTH, RADIUS, a % WIDTH]
-    depth, n, x = triangle_contact(S, T, own + blocks_b[b // WIDTH, RADIUS, b % WIDTH])
+    depth, n, x = triangle_pair_depth(S, T, own + blocks_b[b // WIDTH, RADIUS, b % WIDTH])
     return depth, n, along(x, own, n)
 
 
 @device
-def deepest(
+def deepest_touching(
     blocks_a: Any, blocks_b: Any, X: Any, work: Any, count: int, answer: Any
 ) -> tuple[float, Vector, Vector]:
     """Depth (m) of the deepest of the first pairs of `touching`, its direction, and a point on A.
@@ -218,4 +218,4 @@ def deepest(
 def trees_touch(tree_a, R_a, p_a, tree_b, R_b, p_b, most, work):
     """`touching` of two trees at poses given by rotations (3, 3) and positions (3,) (m)."""
     p = p_b[0] - p_a[0], p_b[1] - p_a[1], p_b[2] - p_a[2]
-    return touching(tree_a, 0, tree_b, 0, relative(R_a, R_b, p), most, work)
+    return touching_triangles(tree_a, 0, tree_b, 0, relative(R_a, R_b, p), most, work)

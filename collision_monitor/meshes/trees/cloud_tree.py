@@ -59,7 +59,7 @@ def cloud_tree(points: Array) -> Array:
     return blocks
 
 
-def cloud_points(blocks: Array, root: int) -> Array:
+def tree_points(blocks: Array, root: int) -> Array:
     """The points (n, 3) of the cloud with a tree that begins at a block, in the user's order."""
     number = int(blocks[root, COUNT, 1])
     sizes = _levels(number)

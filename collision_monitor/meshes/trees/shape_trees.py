@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.bounding_volumes import convex_hull
-from collision_monitor.meshes.distance.contact import reach_of
+from collision_monitor.meshes.distance.contact import tree_reach
 from collision_monitor.meshes.trees.cloud_tree import cloud_tree
 from collision_monitor.meshes.trees.tree import tree_of
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
@@ -53,7 +53,7 @@ def kept_tree(shape: Shape, split: int = 0) -> KeptTree:
         if isinstance(shape, Mesh) and not shape.surface.certain:
             inside = NEVER if len(shape.surface.hole) else UNCERTAIN
         tree, radius = made_tree(shape, split), shape.radius if isinstance(shape, Points) else 0.0
-        known = KeptTree(tree, is_concave_mesh(shape), inside, inf if tree is None else reach_of(tree) + radius)
+        known = KeptTree(tree, is_concave_mesh(shape), inside, inf if tree is None else tree_reach(tree) + radius)
         shape.__dict__["kept_tree"] = known
     return known
 

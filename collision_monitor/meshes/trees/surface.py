@@ -13,7 +13,7 @@ from collision_monitor.meshes.trees.tree import tree_of
 Array = NDArray[np.float64]
 
 
-class Surface(NamedTuple):
+class TreeSurface(NamedTuple):
     """What `tree_of` takes: corners (m, 3, 3), whether they bound a solid, a point of each connected part (k, 3)."""
 
     corners: Array
@@ -26,7 +26,7 @@ class Surface(NamedTuple):
         return tree_of(self.corners, closed=self.closed, parts=self.parts)
 
 
-def surface_of(blocks: Array, root: int) -> Surface:
+def surface_of(blocks: Array, root: int) -> TreeSurface:
     """The surface of the tree of a mesh that begins at a block."""
     boxes = np.array([root])
     leaves = []
@@ -42,4 +42,4 @@ def surface_of(blocks: Array, root: int) -> Surface:
     stored = min(count, MOST_PARTS)
     points = blocks[first : first + -(-stored // WIDTH), :3].transpose(0, 2, 1).reshape(-1, 3)[:stored]
     parts = np.resize(points, (count, 3))  # only the number of the others counts
-    return Surface(corners, bool(blocks[root, CLOSED, 1]), parts)
+    return TreeSurface(corners, bool(blocks[root, CLOSED, 1]), parts)

@@ -90,7 +90,7 @@ def _turned(bodies, i, now, row, at, q):
 
 
 @inlined
-def carry(multibody, i, j, now, query, tolerance, scratch, row, result):
+def carry_contact(multibody, i, j, now, query, tolerance, scratch, row, result):
     """Write the contact of bodies i and j into a result row, from their carried row, if that still holds.
 
     query: ContactQuery. tolerance: largest error (m) that this may add. Returns whether it holds.

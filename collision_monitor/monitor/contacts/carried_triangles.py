@@ -31,7 +31,7 @@ from collision_monitor.meshes.distance.depth_range import depth_range
 from collision_monitor.meshes.distance.nearest import PAIRS, PLACE_A, PLACE_B
 from collision_monitor.meshes.layout import CENTER, WIDTH
 from collision_monitor.meshes.overlap.inside import OUTSIDE
-from collision_monitor.meshes.overlap.touching import touching
+from collision_monitor.meshes.overlap.touching import touching_triangles
 from collision_monitor.meshes.placing import relative, turned_back
 from collision_monitor.motion.bodies import place_shape
 from collision_monitor.motion.motion import rotation_now
@@ -90,7 +90,7 @@ def _meet(table, a, b, pose, row, scratch):
         if scratch.out[DISTANCE] <= 0.0:
             return True
     X, work = relative(pose.R_A, pose.R_B, pose.p), scratch.tree
-    found, _ = touching(table.blocks, root_of(table, a), table.blocks, root_of(table, b), X, 1, work)
+    found, _ = touching_triangles(table.blocks, root_of(table, a), table.blocks, root_of(table, b), X, 1, work)
     if found == 0:
         return False
     row[PLACE_I], row[PLACE_J] = work[PAIRS] - first, work[PAIRS + 1] - second

@@ -17,10 +17,10 @@ from collision_monitor.meshes.distance.feature import (
     number_in_hull,
     off_segment,
     off_triangle,
-    tie_of,
+    slot_tie,
     vertex_at,
 )
-from collision_monitor.meshes.distance.triangle_pair import Triangle
+from collision_monitor.meshes.distance.triangle_pair import Corners
 from collision_monitor.meshes.extent import farthest
 from collision_monitor.motion.bodies import place_shape
 from collision_monitor.motion.motion import age_of, position_now, rotation_now
@@ -187,7 +187,7 @@ def _of_hull(table: Any, s: int, x: Vector, n: Vector, reach: float, work: Any) 
     spanned, _, _ = gjk(cores, work, 2.0 * radius, inf, EXACT)
     # a simplex of one or two points repeats the last; one of four points is flat, so any three of them are its face
     last = min(spanned, 3) - 1
-    T = Triangle(
+    T = Corners(
         plus(simplex_point(work, 0), above),
         plus(simplex_point(work, min(1, last)), above),
         plus(simplex_point(work, last), above),
@@ -200,7 +200,7 @@ def _of_hull(table: Any, s: int, x: Vector, n: Vector, reach: float, work: Any) 
 
 
 @device
-def feature_at(table: Any, s: int, x: Vector, n: Vector, reach: float, work: Any) -> tuple[float, float]:
+def shape_feature_at(table: Any, s: int, x: Vector, n: Vector, reach: float, work: Any) -> tuple[float, float]:
     """Type (contact_row.py) and index of the feature of the shape in slot s at a point x of its surface, in its frame.
 
     It is the face or the edge at the point that touches as a whole, because the outward normal n is at a right angle to
@@ -287,8 +287,8 @@ def complete_contact(multibody: Any, i: int, j: int, now: float, scratch: Any, r
             d = rotate_back(R[2], n if side == 0 else opposite(n))
             x, round_off = core_point(table, s, R[2], o, (row[p], row[p + 1], row[p + 2]), d)
             size = table.radius[s] if table.kind[s] != HALF_SPACE else 0.0
-            reach = tie_of(table, int(row[SHAPE_I]), int(row[SHAPE_J])) * size + round_off
-            row[at], row[at + FEATURE_INDEX_A - FEATURE_TYPE_A] = feature_at(table, s, x, d, reach, scratch.work)
+            reach = slot_tie(table, int(row[SHAPE_I]), int(row[SHAPE_J])) * size + round_off
+            row[at], row[at + FEATURE_INDEX_A - FEATURE_TYPE_A] = shape_feature_at(table, s, x, d, reach, scratch.work)
     if several and row[DISTANCE] <= 0.0:
         if table.kind[int(row[SHAPE_I])] == HALF_SPACE or table.kind[int(row[SHAPE_J])] == HALF_SPACE:
             return  # the only way out is along its normal

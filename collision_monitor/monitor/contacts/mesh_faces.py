@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.errors import InputError
 from collision_monitor.impact.body_contact import SHAPE_I, SHAPE_J
-from collision_monitor.meshes.distance.feature import IN_FACE, feature_in_triangle, off_triangle, tie_of
-from collision_monitor.meshes.distance.triangle_pair import Triangle
+from collision_monitor.meshes.distance.feature import IN_FACE, feature_in_triangle, off_triangle, slot_tie
+from collision_monitor.meshes.distance.triangle_pair import Corners
 from collision_monitor.monitor.contacts.contact_details import core_point, origin_now
 from collision_monitor.monitor.state.snapshot import Snapshot, check_range
 from collision_monitor.motion.bodies import place_shape
@@ -240,9 +240,9 @@ def _height(faces: Any, f: int, x: Vector) -> float:
 
 
 @device
-def _triangle(faces: Any, f: int) -> Triangle:
+def _triangle(faces: Any, f: int) -> Corners:
     c = faces.corners
-    return Triangle(
+    return Corners(
         (c[f, 0, 0], c[f, 0, 1], c[f, 0, 2]), (c[f, 1, 0], c[f, 1, 1], c[f, 1, 2]), (c[f, 2, 0], c[f, 2, 1], c[f, 2, 2])
     )
 
@@ -259,7 +259,7 @@ def _name(multibody: Any, pair: Any, side: int, now: float, faces: Any, scratch:
     n = (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2])
     d = rotate_back(R[1], n if side == 0 else opposite(n))
     x, round_off = core_point(table, s, R[1], o, (row[p], row[p + 1], row[p + 2]), d)
-    reach = tie_of(table, int(row[SHAPE_I]), int(row[SHAPE_J])) * table.radius[s] + round_off
+    reach = slot_tie(table, int(row[SHAPE_I]), int(row[SHAPE_J])) * table.radius[s] + round_off
     row[at], row[at + FEATURE_INDEX_A - FEATURE_TYPE_A] = _feature(faces, s, x, d, reach)
 
 

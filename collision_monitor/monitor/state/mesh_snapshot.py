@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import InputError
-from collision_monitor.meshes.trees.cloud_tree import cloud_points, cloud_tree
+from collision_monitor.meshes.trees.cloud_tree import cloud_tree, tree_points
 from collision_monitor.meshes.trees.slot_trees import plant_trees
-from collision_monitor.meshes.trees.surface import Surface, surface_of
+from collision_monitor.meshes.trees.surface import TreeSurface, surface_of
 from collision_monitor.monitor.state.snapshot import Snapshot, check_range
 from collision_monitor.shapes.shape_table import MESH, POINTS, TREE, ShapeTable, ShapeTableBuilder
 from collision_monitor.shapes.shapes import MOST_CLOUD_POINTS
@@ -32,7 +32,7 @@ def _points(table: ShapeTable) -> dict[str, NDArray[Any]]:
     if not len(slots):
         return {}
     roots, of = np.unique(table.size[slots, TREE].astype(np.int64) - 1, return_inverse=True)
-    found = [cloud_points(table.blocks, int(root)) for root in roots]
+    found = [tree_points(table.blocks, int(root)) for root in roots]
     return {
         "clouds.of": of.astype(np.int32),
         "clouds.count": np.array([len(each) for each in found], np.int32),
@@ -99,7 +99,9 @@ def _plant_triangles(builder: ShapeTableBuilder, snapshot: Snapshot) -> None:
         raise InputError(f"snapshot, meshes: expected finite coordinates up to {LARGEST_INPUT:g}, got others")
     ends, last = np.cumsum(triangles), np.cumsum(parts)
     trees = [
-        Surface(corners[ends[k] - triangles[k] : ends[k]], bool(closed[k]), points[last[k] - parts[k] : last[k]]).tree
+        TreeSurface(
+            corners[ends[k] - triangles[k] : ends[k]], bool(closed[k]), points[last[k] - parts[k] : last[k]]
+        ).tree
         for k in range(len(triangles))
     ]
     for slot, mesh in zip(slots.tolist(), of.tolist(), strict=True):

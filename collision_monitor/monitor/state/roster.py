@@ -20,7 +20,7 @@ from collision_monitor.meshes.trees.slot_trees import plant_trees
 from collision_monitor.monitor.contacts.mesh_faces import MeshFaces, faces_of
 from collision_monitor.monitor.state.mesh_snapshot import mesh_arrays, plant_meshes
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage, check_range
-from collision_monitor.motion.bodies import DERIVED, Bodies, Multibody, Parts, enlarge, make_bodies, make_parts
+from collision_monitor.motion.bodies import DERIVED, BodyTable, Multibody, Parts, enlarge, make_bodies, make_parts
 from collision_monitor.motion.body_layout import lay_out_body, note_plain
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled, monitored_model
@@ -75,7 +75,7 @@ class Roster(Stage):
     CACHES = ("_last_ids", "_last_slots", "_allowed_keys", "_all_memory", "_by_name")
 
     def __init__(self) -> None:
-        self.bodies: Bodies = make_bodies(FIRST_CAPACITY)
+        self.bodies: BodyTable = make_bodies(FIRST_CAPACITY)
         self.parts = make_parts(FIRST_CAPACITY)
         self.top = 0
         self.planar = False
@@ -369,7 +369,7 @@ class Roster(Stage):
         while capacity < top:
             capacity *= 2
         saved = snapshot.columns("bodies", self.bodies, top, without=DERIVED)
-        bodies = Bodies(**saved, plain=np.zeros(top, np.uint8))
+        bodies = BodyTable(**saved, plain=np.zeros(top, np.uint8))
         parts = Parts(**snapshot.columns("parts", self.parts, count))
         _check_chains(bodies, parts, self._shapes.used.kind)
         self.top, self.bodies, self.parts = top, make_bodies(capacity), make_parts(len(self._shapes.table.kind))
@@ -418,7 +418,7 @@ class Roster(Stage):
         self.mesh_faces = MeshFaces.restored(snapshot, table.kind)
 
 
-def _check_chains(bodies: Bodies, parts: Parts, kind: NDArray[Any]) -> None:
+def _check_chains(bodies: BodyTable, parts: Parts, kind: NDArray[Any]) -> None:
     """Check that every body in use has shapes, and that no chain of shapes is circular. Raises InputError."""
     check_range("bodies.first_shape", bodies.first_shape, -1, len(kind))
     check_range("parts.next", parts.next, -1, len(kind))

@@ -16,8 +16,15 @@ from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B, as_contacts
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
 from collision_monitor.query.arguments import Compound
-from collision_monitor.query.contact.convex_pairs import convex_contact
-from collision_monitor.query.contact.deepest import by_clouds, by_pieces, by_trees, locate, nearest_pieces, turn_inward
+from collision_monitor.query.contact.convex_pairs import packed_contact
+from collision_monitor.query.contact.deepest import (
+    by_clouds,
+    by_pieces,
+    by_trees,
+    locate_in_meshes,
+    nearest_pieces,
+    turn_inward,
+)
 from collision_monitor.query.contact.mesh_pairs import mesh_contact
 from collision_monitor.query.contact.nearest_pieces import NearestPieces
 from collision_monitor.query.contact.open_gap import distance_of_fillings
@@ -156,7 +163,7 @@ def contact(
     Contact(1 m ± ..., box face 0 – sphere surface)
     """
     if (type(model) is str and model == "exact") or (isinstance(model, str | int) and model == Model.EXACT):
-        by_kernel = mesh_contact if type(shape_a) is Mesh or type(shape_b) is Mesh else convex_contact
+        by_kernel = mesh_contact if type(shape_a) is Mesh or type(shape_b) is Mesh else packed_contact
         quick = by_kernel(shape_a, pose_a, shape_b, pose_b)
         if quick is not None:
             return contact_of_row(quick, (shape_a, pose_a, shape_b, pose_b))
@@ -184,7 +191,7 @@ def _contact(
     row = deepest.row
     least = np.inf
     if row[DISTANCE] > 0.0 and (a.is_uncertain or b.is_uncertain):
-        places = locate(a, b, offset), locate(b, a, -offset)
+        places = locate_in_meshes(a, b, offset), locate_in_meshes(b, a, -offset)
         if Location.INSIDE in places:
             turn_inward(row)
         else:

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.contact_features import FeatureType
-from collision_monitor.query.contact.features import feature_of, tie_of
+from collision_monitor.query.contact.features import feature_of, shape_tie
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.shapes import Box, ConvexHull, Mesh, Points, Shape
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 def contact_text(contact: Contact) -> str:
     """Text such as `Contact(0.0123 m ± 1e-12, box face 3 – capsule surface)`."""
     shape_a, pose_a, shape_b, pose_b = contact.arguments
-    tie, off = tie_of(shape_a, shape_b), contact.error_bound
+    tie, off = shape_tie(shape_a, shape_b), contact.error_bound
     a = _feature(shape_a, pose_a, contact.point_a, contact.normal, tie, off)
     b = _feature(shape_b, pose_b, contact.point_b, -contact.normal, tie, off)
     return f"Contact({contact.signed_distance:.4g} m ± {contact.error_bound:.1g}, {a} – {b})"

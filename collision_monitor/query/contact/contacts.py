@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
-from collision_monitor.query.batch_result import Batch, Pairs
+from collision_monitor.query.batch_result import BatchResult, Pairs
 from collision_monitor.query.contact.contact import Contact, contact, contact_of_row
 from collision_monitor.query.contact.contact_rows import contact_rows
 from collision_monitor.query.contact.convex_pairs import MEMORY
@@ -18,10 +18,10 @@ from collision_monitor.query.pair_arrays import (
     Shapes,
     pack_shapes,
     pair_count,
+    pair_ranges,
     part,
     pose_of,
     pose_rows,
-    ranges,
 )
 from collision_monitor.shapes.pose import Pose
 
@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Contacts(Batch[Contact]):
+class Contacts(BatchResult[Contact]):
     """Contacts of N pairs in the world frame, with the meaning of the fields of `Contact`; lengths in m.
 
     `contacts[k]` is the Contact of pair k; a slice, a mask or numbers select several pairs.
@@ -109,7 +109,7 @@ def contacts(
     at_a, at_b = np.maximum(a.at, 0), np.maximum(b.at, 0)
     memory = MEMORY.enlarge(a.rows, b.rows)
     rows = np.zeros((count, CONTACT_SIZE))
-    for which in ranges(count, progress):
+    for which in pair_ranges(count, progress):
         begin, end = np.searchsorted(special, (which.start, which.stop))
         if end - begin < which.stop - which.start and len(a.rows) and len(b.rows):
             contact_rows(

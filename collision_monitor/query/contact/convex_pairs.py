@@ -38,7 +38,7 @@ _START: Final = np.zeros(1, np.int64)
 """The place of a packed shape that stands alone."""
 
 
-def convex_contact(shape_a: Any, pose_a: Any, shape_b: Any, pose_b: Any) -> tuple[float, float, Array] | None:
+def packed_contact(shape_a: Any, pose_a: Any, shape_b: Any, pose_b: Any) -> tuple[float, float, Array] | None:
     """Signed distance and error bound (m) of two solids of PACKED_KINDS, and their contact row, points in the world.
 
     None for other arguments, also for those that are no shapes or no poses.

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from collision_monitor.geometry.inside import UNKNOWN, locate_in_surface
 from collision_monitor.geometry.point_in_polygon import Location
-from collision_monitor.meshes.distance.contact import APART, OPEN, contact_of_trees, in_root_box, reach_of
+from collision_monitor.meshes.distance.contact import APART, OPEN, contact_of_trees, in_root_box, tree_reach
 from collision_monitor.meshes.distance.nearest import MEMORY, answer_row
 from collision_monitor.meshes.trees.shape_trees import shape_tree
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A
 from collision_monitor.objects.models import exact_model
 from collision_monitor.query.contact.nearest_pieces import NearestPieces
 from collision_monitor.query.contact.surface_pair import surface_contact
-from collision_monitor.query.posed import Posed, place
+from collision_monitor.query.posed import Posed, pose_in_world
 from collision_monitor.records import Model
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
 from collision_monitor.shapes.shapes import Capsule, ConvexHull, Mesh, Points, Sphere
@@ -49,7 +49,7 @@ def by_pieces(a: Posed, b: Posed, offset: Array) -> Deepest:
     found = nearest_pieces(a, b, offset)
     row = found.best.copy()
     row[POINT_A : POINT_A + 3] += found.position[found.pair[0]]
-    if row[DISTANCE] > 0.0 and Location.INSIDE in (locate(a, b, offset), locate(b, a, -offset)):
+    if row[DISTANCE] > 0.0 and Location.INSIDE in (locate_in_meshes(a, b, offset), locate_in_meshes(b, a, -offset)):
         turn_inward(row)
     return Deepest(row, lambda: found)
 
@@ -69,7 +69,7 @@ def by_clouds(a: Posed, b: Posed, offset: Array) -> Deepest | None:
         for pair_b in exact_model(b.outline).pieces:
             own, other = Posed([pair_a], a.pose, [pair_a]), Posed([pair_b], b.pose, [pair_b])
             if isinstance(pair_a[0], Points) or isinstance(pair_b[0], Points):
-                X, (R, p) = place(own), place(other)
+                X, (R, p) = pose_in_world(own), pose_in_world(other)
                 row = surface_contact(pair_a[0], X, pair_b[0], (R, p + offset))
                 row[POINT_A : POINT_A + 3] += X[1]
             else:
@@ -104,14 +104,14 @@ def by_trees(a: Posed, b: Posed, offset: Array) -> Deepest | None:
     def pieces() -> NearestPieces:
         return nearest_pieces(a, b, offset)
 
-    (R_a, p_a), (R_b, p_b) = place(a), place(b)
+    (R_a, p_a), (R_b, p_b) = pose_in_world(a), pose_in_world(b)
     p_b = p_b + offset
     trees = shape_tree(pair[0]), shape_tree(pair[1])
     if trees[0] is not None and trees[1] is not None:
         known, row = contact_by_trees((trees[0], trees[1]), (R_a, p_a), (R_b, p_b))
         if known == APART or all(isinstance(shape, Mesh | Sphere | Capsule) for shape in pair):
             if known == OPEN:
-                row[BOUND] += reach_of(trees[0]) + reach_of(trees[1]) + float(np.linalg.norm(p_b - p_a))
+                row[BOUND] += tree_reach(trees[0]) + tree_reach(trees[1]) + float(np.linalg.norm(p_b - p_a))
             row[POINT_A : POINT_A + 3] += p_a
             return Deepest(row, pieces)
     if any(isinstance(shape, ConvexHull) for shape in pair):  # the kernel of a triangle and a solid takes no corners
@@ -121,7 +121,7 @@ def by_trees(a: Posed, b: Posed, offset: Array) -> Deepest | None:
     return Deepest(row, pieces)
 
 
-def locate(inner: Posed, outer: Posed, offset: Array) -> int:
+def locate_in_meshes(inner: Posed, outer: Posed, offset: Array) -> int:
     """Location of `inner` in the meshes of `outer`, at `offset` (m) from it; no surfaces meet.
 
     It is UNKNOWN where more than MOST_TESTS are needed, as for two soups of 100,000 triangles.

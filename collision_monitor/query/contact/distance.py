@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collision_monitor.query.arguments import Compound
 from collision_monitor.query.contact.contact import contact
-from collision_monitor.query.contact.convex_pairs import convex_contact
+from collision_monitor.query.contact.convex_pairs import packed_contact
 from collision_monitor.shapes.pose import Pose
 
 
@@ -18,6 +18,6 @@ def distance(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -
     >>> cm.distance(cm.Sphere(1.0), cm.Pose(), cm.Box((1, 1, 1)), cm.Pose((2, 0, 0)))
     0.5
     """
-    if (found := convex_contact(shape_a, pose_a, shape_b, pose_b)) is not None:
+    if (found := packed_contact(shape_a, pose_a, shape_b, pose_b)) is not None:
         return found[0]
     return contact(shape_a, pose_a, shape_b, pose_b).signed_distance

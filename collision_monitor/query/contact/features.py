@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import convex_hull
-from collision_monitor.geometry.contact_features import Feature, FeatureContact, FeatureType, feature_at
+from collision_monitor.geometry.contact_features import Feature, FeatureContact, FeatureType, mesh_feature_at
 from collision_monitor.geometry.round_features import (
     ROUND_TIE,
     feature_of_cone,
@@ -68,14 +68,14 @@ def contact_features(contact: Contact, shape_a: Shape, pose_a: Pose, shape_b: Sh
     checked_pose(pose_b, "pose_b")
     if not isinstance(contact, Contact):
         raise InputError(f"contact: expected the result of `contact` of the two shapes, got {contact!r:.100}")
-    tie = tie_of(shape_a, shape_b)
+    tie = shape_tie(shape_a, shape_b)
     return FeatureContact(
         feature_of(shape_a, pose_a, contact.point_a, contact.normal, tie, contact.error_bound),
         feature_of(shape_b, pose_b, contact.point_b, -contact.normal, tie, contact.error_bound),
     )
 
 
-def tie_of(shape_a: object, shape_b: object) -> float:
+def shape_tie(shape_a: object, shape_b: object) -> float:
     """Largest difference of equal heights, relative, for the witness points of two shapes."""
     curved = any(isinstance(shape, Cylinder | Cone | Ellipsoid) for shape in (shape_a, shape_b))
     return ROUND_TIE if curved else FEATURE_TIE
@@ -90,14 +90,14 @@ def feature_of(shape: Shape, pose: Pose, point: Array, normal: Array, tie: float
     at, towards = (point - pose.position) @ pose.rotation, normal @ pose.rotation
     match shape:
         case Mesh():
-            return feature_at(at, towards, shape.vertices, shape.faces, tie, off)
+            return mesh_feature_at(at, towards, shape.vertices, shape.faces, tie, off)
         case ConvexHull():
             hull = convex_hull(shape.points)
-            found = feature_at(at, towards, hull.vertices, hull.faces, tie, off)
+            found = mesh_feature_at(at, towards, hull.vertices, hull.faces, tie, off)
             same = (shape.points == hull.vertices[list(found.vertices), None]).all(axis=-1)
             return found._replace(vertices=tuple(same.argmax(axis=1).tolist()))
         case Box():
-            found = feature_at(at, towards, _SIDES * shape.size, _TRIANGLES, tie, off)
+            found = mesh_feature_at(at, towards, _SIDES * shape.size, _TRIANGLES, tie, off)
             if found.type is FeatureType.FACE:
                 return _side(found.face // 2)
             if found.type is FeatureType.EDGE and found.vertices in _DIAGONALS:

@@ -15,7 +15,7 @@ from collision_monitor.meshes.boxes import box_separations
 from collision_monitor.meshes.distance.contact import APART, tree_contact
 from collision_monitor.meshes.distance.nearest import ANSWER, BOUNDS, MEMORY, PLACE_A, PLACE_B
 from collision_monitor.meshes.overlap.inside import OUTSIDE, is_either_in
-from collision_monitor.meshes.overlap.touching import touching
+from collision_monitor.meshes.overlap.touching import touching_triangles
 from collision_monitor.meshes.placing import relative
 from collision_monitor.meshes.trees.shape_trees import CERTAIN, NEVER, KeptTree, have_kernels, kept_tree
 from collision_monitor.motion.motion import quaternion_to_matrix
@@ -75,7 +75,7 @@ def mesh_overlap(shape_a: Any, pose_a: Any, shape_b: Any, pose_b: Any) -> bool |
         return False
     if not have_kernels(a, b, NEVER):
         return None
-    meet: bool = trees_overlap.entry(a.tree, x_a, b.tree, x_b, _OWN.work)
+    meet: bool = packed_trees_overlap.entry(a.tree, x_a, b.tree, x_b, _OWN.work)
     return meet
 
 
@@ -127,7 +127,7 @@ def roots_apart(tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, memory: Any)
 
 @settled
 @kernel
-def trees_overlap(tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, memory: Any) -> bool:
+def packed_trees_overlap(tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, memory: Any) -> bool:
     """Whether two trees have a point in common, on a surface or in a solid, or may have one if it takes too long.
 
     pose_a, pose_b (1, 7): position (m) and unit quaternion (x, y, z, w). memory: of `query_memory`.
@@ -135,7 +135,7 @@ def trees_overlap(tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, memory: An
     R = memory[_ROTATIONS:_ANSWER].reshape((2, 3, 3))
     p = _place(pose_a, pose_b, R)
     X = relative(R[0], R[1], p)
-    if not touching(tree_a, 0, tree_b, 0, X, 1, memory)[1]:
+    if not touching_triangles(tree_a, 0, tree_b, 0, X, 1, memory)[1]:
         return True
     return is_either_in(tree_a, 0, tree_b, 0, X, 0.0, memory) != OUTSIDE
 

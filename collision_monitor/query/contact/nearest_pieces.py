@@ -11,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.broad_phase.boxes import ranges
+from collision_monitor.broad_phase.boxes import concatenated_ranges
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE, DISTANCE
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.query.piece_table import PieceTable
@@ -101,7 +101,7 @@ class NearestPieces:
 
 def _leaves(trees: Any, nodes: Indices) -> tuple[Indices, Indices]:
     """Every pair of a piece of A and a piece of B in the pairs of spheres (2, n) of the last levels."""
-    i, owner = ranges(trees[0].first[nodes[0]], np.diff(trees[0].first)[nodes[0]])
+    i, owner = concatenated_ranges(trees[0].first[nodes[0]], np.diff(trees[0].first)[nodes[0]])
     j = nodes[1, owner]
-    j, again = ranges(trees[1].first[j], np.diff(trees[1].first)[j])
+    j, again = concatenated_ranges(trees[1].first[j], np.diff(trees[1].first)[j])
     return trees[0].order[i[again]], trees[1].order[j]

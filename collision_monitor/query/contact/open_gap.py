@@ -11,9 +11,9 @@ from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.meshes.distance.contact import OPEN
 from collision_monitor.meshes.trees.shape_trees import trees_of_pair
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE
-from collision_monitor.query.contact.deepest import by_clouds, by_pieces, by_trees, contact_by_trees, locate
+from collision_monitor.query.contact.deepest import by_clouds, by_pieces, by_trees, contact_by_trees, locate_in_meshes
 from collision_monitor.query.contact.fillings import fillings
-from collision_monitor.query.posed import Posed, place
+from collision_monitor.query.posed import Posed, pose_in_world
 from collision_monitor.records import Model
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.shapes import Shape
@@ -30,7 +30,7 @@ def may_be_inside(
 ) -> bool:
     """Whether an object may be inside a mesh of another one, although their surfaces are apart."""
     a, b = Posed(inner, pose, inner), Posed(outer, outer_pose, outer)
-    return locate(a, b, outer_pose.position - pose.position) != Location.OUTSIDE
+    return locate_in_meshes(a, b, outer_pose.position - pose.position) != Location.OUTSIDE
 
 
 def least_gap(
@@ -57,7 +57,7 @@ def _least_gap(
         if trees is None:
             row = (by_clouds(a, b, offset) or by_trees(a, b, offset) or by_pieces(a, b, offset)).row
         else:
-            place_a, (R_b, p_b) = place(a), place(b)
+            place_a, (R_b, p_b) = pose_in_world(a), pose_in_world(b)
             known, row = contact_by_trees(trees, place_a, (R_b, p_b + offset))
             if known == OPEN:
                 return -np.inf

@@ -13,7 +13,7 @@ from collision_monitor.geometry.lecture.polyhedron_sat import sat_3d
 from collision_monitor.geometry.triangulation import convex_parts
 from collision_monitor.query.arguments import Compound, checked_pose
 from collision_monitor.query.contact.contact import contact
-from collision_monitor.query.contact.convex_pairs import convex_contact
+from collision_monitor.query.contact.convex_pairs import packed_contact
 from collision_monitor.query.contact.mesh_pairs import mesh_overlap
 from collision_monitor.shapes.compound import shape_pairs
 from collision_monitor.shapes.planar import flat_pose
@@ -40,7 +40,7 @@ def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, te
         if type(shape_a) is Mesh or type(shape_b) is Mesh:
             if (meet := mesh_overlap(shape_a, pose_a, shape_b, pose_b)) is not None:
                 return meet
-        elif (found := convex_contact(shape_a, pose_a, shape_b, pose_b)) is not None:
+        elif (found := packed_contact(shape_a, pose_a, shape_b, pose_b)) is not None:
             return found[0] <= 0.0
         return contact(shape_a, pose_a, shape_b, pose_b).overlaps
     if not isinstance(test, str) or test not in TESTS:

@@ -10,7 +10,7 @@ from collision_monitor._jit import inlined, kernel
 from collision_monitor._jit.settled import settled
 from collision_monitor.impact.body_impact import ImpactQuery, ShapePair, Tube, Window, body_impact, shape_impact
 from collision_monitor.impact.impact_record import CLEAR, HIT
-from collision_monitor.impact.sphere_interval import approach_at, sphere_interval
+from collision_monitor.impact.sphere_interval import relative_motion_at, sphere_interval
 from collision_monitor.meshes.distance.nearest import LEAST, PLACE_A, PLACE_B
 from collision_monitor.meshes.layout import FACE, WIDTH
 from collision_monitor.meshes.trees.shape_trees import NEVER, have_kernels, kept_tree
@@ -27,7 +27,7 @@ from collision_monitor.shapes.shapes import Shape
 from collision_monitor.tolerances import GJK_TOUCHING
 
 
-def mesh_impact(
+def first_mesh_impact(
     shape_a: Shape,
     motion_a: Motion,
     shape_b: Shape,
@@ -129,7 +129,7 @@ def _mesh_impact(
 def _first_time(table, parts, bodies, window, search, scratch):
     """First time in a window (s) at which two convex solids meet, or may meet; infinite: never."""
     A, B = bodies.motion[0], bodies.motion[1]
-    approach = approach_at(A, B, window.begin)
+    approach = relative_motion_at(A, B, window.begin)
     reach, bent = A.radius + B.radius + search.margin, half_acceleration(A, B) * window.end
     first, last = sphere_interval(approach.p, approach.v, reach, bent, window.end, 1.0)
     if first > last:

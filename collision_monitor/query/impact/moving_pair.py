@@ -14,7 +14,7 @@ from collision_monitor.impact.body_impact import ImpactQuery, make_scratch
 from collision_monitor.impact.impact_record import IMPACT
 from collision_monitor.impact.pair_impacts import bodies_overlap_time, predict_pairs
 from collision_monitor.meshes.trees.shape_trees import shape_tree
-from collision_monitor.motion.bodies import Bodies, Multibody, make_bodies, make_parts
+from collision_monitor.motion.bodies import BodyTable, Multibody, make_bodies, make_parts
 from collision_monitor.motion.body_layout import lay_out_body
 from collision_monitor.objects.excess import PosedShapes
 from collision_monitor.objects.models import containing_model, exact_model
@@ -171,7 +171,7 @@ def lay_out_pair(a: MovingShape, b: MovingShape, horizon: float, apart: bool = F
     return multibody
 
 
-def _set_reference_motion(bodies: Bodies, k: int, motion: Motion, horizon: float) -> None:
+def _set_reference_motion(bodies: BodyTable, k: int, motion: Motion, horizon: float) -> None:
     bodies.id[k] = k
     reference = bodies.motion[k]
     reference["cover"] = horizon

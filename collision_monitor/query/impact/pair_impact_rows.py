@@ -11,7 +11,7 @@ from collision_monitor._jit import inlined, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor.impact.body_impact import ImpactQuery, Scratch, Window, body_impact, make_scratch
 from collision_monitor.impact.impact_record import CLEAR, HIT, IMPACT
-from collision_monitor.motion.bodies import Bodies, Multibody, Parts, make_bodies, make_parts
+from collision_monitor.motion.bodies import BodyTable, Multibody, Parts, make_bodies, make_parts
 from collision_monitor.motion.motion import quaternion_to_matrix
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE, DISTANCE
 from collision_monitor.query.contact.contact_rows import write_contact
@@ -28,7 +28,7 @@ TOO_SMALL: Final = 2
 class ImpactMemory(NamedTuple):
     """Two bodies and the work memory of their search."""
 
-    bodies: Bodies
+    bodies: BodyTable
     parts: Parts
     scratch: Scratch
     event: Any  # (1,) IMPACT

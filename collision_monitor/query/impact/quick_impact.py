@@ -8,11 +8,11 @@ from typing import Final
 
 from collision_monitor.meshes.trees.shape_trees import NEVER, have_kernels, kept_tree
 from collision_monitor.query.arguments import Compound
-from collision_monitor.query.contact.convex_pairs import convex_contact, convex_impact
+from collision_monitor.query.contact.convex_pairs import convex_impact, packed_contact
 from collision_monitor.query.contact.fillings import filled_box, filled_mesh
 from collision_monitor.query.contact.mesh_pairs import boxes_apart
 from collision_monitor.query.contact.open_gap import may_be_inside
-from collision_monitor.query.impact.mesh_impact import impact_in_hulls, mesh_impact, mesh_impact_of_faces
+from collision_monitor.query.impact.mesh_impact import first_mesh_impact, impact_in_hulls, mesh_impact_of_faces
 from collision_monitor.query.impact.moving_pair import MotionQuery
 from collision_monitor.shapes.pose import Motion, Pose
 from collision_monitor.shapes.shapes import Mesh, Shape
@@ -34,7 +34,7 @@ def quick_impact(
     if type(shape_a) is not Mesh and type(shape_b) is not Mesh:
         return convex_impact(shape_a, motion_a, shape_b, motion_b, query)
     if isinstance(shape_a, Shape) and isinstance(shape_b, Shape):
-        return mesh_impact(shape_a, motion_a, shape_b, motion_b, query)
+        return first_mesh_impact(shape_a, motion_a, shape_b, motion_b, query)
     return None
 
 
@@ -72,7 +72,7 @@ def quick_open_impact(
     first, holds_surfaces = possible
     if holds_surfaces and first == inf:
         return inf, inf
-    found = mesh_impact(shape_a, motion_a, shape_b, motion_b, query, first if holds_surfaces else 0.0)
+    found = first_mesh_impact(shape_a, motion_a, shape_b, motion_b, query, first if holds_surfaces else 0.0)
     return found and (min(first, found[0]), found[1])
 
 
@@ -126,6 +126,6 @@ def _overlap(a: Shape, motion_a: Motion, b: Shape, motion_b: Motion, query: Moti
     """Whether two convex solids certainly are within the separation now."""
     if isinstance(a, Mesh) or isinstance(b, Mesh):
         return False
-    found = convex_contact(a, motion_a.pose, b, motion_b.pose)
+    found = packed_contact(a, motion_a.pose, b, motion_b.pose)
     touching = GJK_TOUCHING * (kept_tree(a).reach + kept_tree(b).reach)
     return found is not None and found[0] + found[1] < query.separation - touching

@@ -13,7 +13,7 @@ from collision_monitor.errors import InputError, PoseError
 from collision_monitor.impact.body_impact import ImpactQuery, make_scratch
 from collision_monitor.impact.impact_record import IMPACT
 from collision_monitor.query.arguments import Compound
-from collision_monitor.query.batch_result import Batch, Pairs
+from collision_monitor.query.batch_result import BatchResult, Pairs
 from collision_monitor.query.impact.impact_rows import (
     ImpactTimes,
     impacts_of_rows,
@@ -41,7 +41,7 @@ _STILL: Final = Motion(Pose())
 
 
 @dataclass(frozen=True, eq=False)
-class Impacts(Batch[Impact]):
+class Impacts(BatchResult[Impact]):
     """Results for N motions, with the meaning of `Impact`: status (N,) of str, lower and upper (N,) in s.
 
     `impacts[k]` is the Impact of motion k, with its contact; a slice, a mask or numbers select several motions.

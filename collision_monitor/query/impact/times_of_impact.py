@@ -19,9 +19,9 @@ from collision_monitor.query.pair_arrays import (
     number_rows,
     pack_shapes,
     pair_count,
+    pair_ranges,
     part,
     pose_rows,
-    ranges,
 )
 
 
@@ -66,7 +66,7 @@ def times_of_impact(
     at_a, at_b = np.maximum(a.at, 0), np.maximum(b.at, 0)
     memory, wanted = MEMORY.enlarge(a.rows, b.rows), np.array(query, dtype=np.float64)
     rows = np.full((count, 3), math.inf)
-    for which in ranges(count, progress):
+    for which in pair_ranges(count, progress):
         if not special[which].all():
             pair_impact_rows(
                 a.rows, part(at_a, which), part(s_a, which), b.rows, part(at_b, which), part(s_b, which),

@@ -22,7 +22,7 @@ from collision_monitor import codec
 from collision_monitor.errors import CollisionMonitorError, InputError, MessageError
 from collision_monitor.pipeline.topics import GUARD_STATE, NODE, Topic
 from collision_monitor.ros.endpoints import subscription
-from collision_monitor.ros.guard.speed_limit import PASSES, Braking, RobotPose, Twist2, Verdict, verdict
+from collision_monitor.ros.guard.speed_limit import PASSES, Braking, RobotPose, SpeedVerdict, Twist2, verdict
 from collision_monitor.ros.parameters import ParameterReader
 
 PERIOD: Final = 0.05
@@ -176,10 +176,10 @@ class GuardNode(Node):
     def _stamp(self) -> Any:
         return self.get_clock().now().to_msg()
 
-    def _verdict(self, now: float) -> Verdict:
+    def _verdict(self, now: float) -> SpeedVerdict:
         missing = self._missing(now)
         if missing:
-            return Verdict(0.0, "", missing)
+            return SpeedVerdict(0.0, "", missing)
         if self._command is None:
             return PASSES
         assert self._robot is not None
@@ -187,7 +187,7 @@ class GuardNode(Node):
         twist = self._command.twist if self._stamped else self._command
         command = Twist2(twist.linear.x, twist.linear.y, twist.angular.z)
         if not np.isfinite(command).all():
-            return Verdict(0.0, "", "the command is not finite")
+            return SpeedVerdict(0.0, "", "the command is not finite")
         return verdict(self._braking, self._alerts, self._robot, self._pose, command)
 
     def _missing(self, now: float) -> str:
@@ -205,7 +205,7 @@ class GuardNode(Node):
             return f"no state of {self._name!r} for {min(age['robot'], 1e4):.1f} s"
         return ""
 
-    def _report(self, found: Verdict) -> None:
+    def _report(self, found: SpeedVerdict) -> None:
         """Log and publish what the guard does, when that changes."""
         action = NOTHING if found.factor == 1.0 else STOP if found.factor == 0.0 else SLOWDOWN
         key = found.rule or found.reason.partition(" for ")[0]  # an age that grows is no news

@@ -60,7 +60,7 @@ class RobotPose(NamedTuple):
     vy: float = 0.0
 
 
-class Verdict(NamedTuple):
+class SpeedVerdict(NamedTuple):
     """The factor on the command, the rule that set it, and why; empty: the command passes."""
 
     factor: float
@@ -68,12 +68,12 @@ class Verdict(NamedTuple):
     reason: str = ""
 
 
-PASSES = Verdict(1.0)
+PASSES = SpeedVerdict(1.0)
 
 
 def verdict(
     braking: Braking, alerts: Iterable[CollisionAlert], robot: int, pose: RobotPose, command: Twist2
-) -> Verdict:
+) -> SpeedVerdict:
     """Return the smallest factor that any alert of the robot asks for.
 
     A command that moves away from the nearest point of an obstacle passes, so that a stopped robot can retreat; from
@@ -89,7 +89,7 @@ def verdict(
     return worst
 
 
-def _of_alert(braking: Braking, alert: CollisionAlert, is_a: bool, pose: RobotPose, command: Twist2) -> Verdict:
+def _of_alert(braking: Braking, alert: CollisionAlert, is_a: bool, pose: RobotPose, command: Twist2) -> SpeedVerdict:
     name = AlertLevel(alert.level).name.lower()
     other = alert.name_b if is_a else alert.name_a
     at, to = (alert.point_a, alert.point_b) if is_a else (alert.point_b, alert.point_a)
@@ -114,7 +114,7 @@ def _of_alert(braking: Braking, alert: CollisionAlert, is_a: bool, pose: RobotPo
     if factor * speed > allowed:
         factor = allowed / speed
         reason = f"{name}: {other} at {alert.distance:.2f} m allows {allowed:.2f} m/s"
-    return Verdict(0.0 if factor < 1e-3 else factor, alert.rule, reason)
+    return SpeedVerdict(0.0 if factor < 1e-3 else factor, alert.rule, reason)
 
 
 def _allowed(braking: Braking, distance: float, speed: float, closing: float, approach: float) -> float:

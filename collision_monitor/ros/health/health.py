@@ -14,8 +14,8 @@ from typing import Final
 
 from collision_monitor.codec import MonitorStatus
 from collision_monitor.errors import Refusal
-from collision_monitor.ros.health.line_report import Level, LineReport
-from collision_monitor.session import Recording
+from collision_monitor.ros.health.line_report import DiagnosticLevel, LineReport
+from collision_monitor.session import RecordingState
 
 HISTORY: Final = 10
 """Reports over which counters are compared: a single refusal stays visible for about 10 s."""
@@ -30,13 +30,13 @@ class Report:
     """One DiagnosticStatus without its node."""
 
     task: str
-    level: Level
+    level: DiagnosticLevel
     text: str
     values: dict[str, str]
 
 
 @dataclass(frozen=True)
-class Facts:
+class NodeFacts:
     """What the reports rest on.
 
     topic: of the states. silence: s since newer states arrived, by the steady clock; None: none arrived yet.
@@ -63,7 +63,7 @@ class Facts:
 
 
 @dataclass
-class History:
+class LastReports:
     """The statuses, the refusals of each source and the outdated messages at the last reports of one configuration."""
 
     _statuses: deque[MonitorStatus] = field(default_factory=lambda: deque(maxlen=HISTORY))
@@ -84,11 +84,11 @@ class History:
         first = self._refused[0] if len(self._refused) == HISTORY else {}
         return line.refused - first.get(line.name, 0)
 
-    def outdated(self, facts: Facts) -> int:
+    def outdated(self, facts: NodeFacts) -> int:
         """Return the number of messages that were left out since the oldest report."""
         return facts.outdated - (self._outdated[0] if len(self._outdated) == HISTORY else 0)
 
-    def add(self, facts: Facts) -> None:
+    def add(self, facts: NodeFacts) -> None:
         """Remember the counters of this report."""
         self._statuses.append(facts.status)
         self._outdated.append(facts.outdated)
@@ -99,22 +99,23 @@ class _Findings:
     """Collects what is wrong; the report has the highest level, and the texts with the worst first."""
 
     def __init__(self) -> None:
-        self._found: list[tuple[Level, str]] = []
+        self._found: list[tuple[DiagnosticLevel, str]] = []
 
-    def add(self, level: Level, text: str) -> None:
+    def add(self, level: DiagnosticLevel, text: str) -> None:
         self._found.append((level, text))
 
     def report(self, task: str, otherwise: str, values: dict[str, object]) -> Report:
         found = sorted(self._found, key=lambda each: -each[0])
         text = "; ".join(text for _, text in found) or otherwise
-        return Report(task, max((level for level, _ in found), default=Level.OK), text, _texts(values))
+        return Report(task, max((level for level, _ in found), default=DiagnosticLevel.OK), text, _texts(values))
 
 
-def reports(state: str, failure: str, facts: Facts | None, history: History) -> list[Report]:
+def reports(state: str, failure: str, facts: NodeFacts | None, history: LastReports) -> list[Report]:
     """Return the reports of the node. facts: None if it is not configured. Adds the status to the history."""
     if facts is None:
         absent = [
-            Report(task, Level.STALE, f"none: the node is {state}", {}) for task in ("inputs", "steps", "recording")
+            Report(task, DiagnosticLevel.STALE, f"none: the node is {state}", {})
+            for task in ("inputs", "steps", "recording")
         ]
         return [_state(state, failure, 0), *absent]
     found = [
@@ -132,56 +133,62 @@ def reports(state: str, failure: str, facts: Facts | None, history: History) -> 
 def _state(state: str, failure: str, other_nodes: int) -> Report:
     findings = _Findings()
     if failure:
-        findings.add(Level.ERROR, failure)
+        findings.add(DiagnosticLevel.ERROR, failure)
     if other_nodes:
-        findings.add(Level.ERROR, "another node of this name publishes on the same topics")
+        findings.add(DiagnosticLevel.ERROR, "another node of this name publishes on the same topics")
     if state != "active":
-        findings.add(Level.WARN, f"{state}: no answers are published")
+        findings.add(DiagnosticLevel.WARN, f"{state}: no answers are published")
     return findings.report("state", "active", {"state": state, "nodes of the same name": other_nodes})
 
 
-def _inputs(facts: Facts, history: History) -> Report:
+def _inputs(facts: NodeFacts, history: LastReports) -> Report:
     status, findings = facts.status, _Findings()
     moving = status.objects - status.objects_static
     if facts.silence is not None and facts.silence >= facts.stale_after and moving:
-        findings.add(Level.ERROR, f"silent: no newer states on {facts.topic} for {facts.silence:.1f} s")
+        findings.add(DiagnosticLevel.ERROR, f"silent: no newer states on {facts.topic} for {facts.silence:.1f} s")
     elif facts.stale:
-        findings.add(Level.ERROR, f"stale: no usable new state of object {facts.stale}")
+        findings.add(DiagnosticLevel.ERROR, f"stale: no usable new state of object {facts.stale}")
     if status.objects_unseen:
-        findings.add(Level.ERROR, f"unseen: no state yet of object {facts.unseen}")
+        findings.add(DiagnosticLevel.ERROR, f"unseen: no state yet of object {facts.unseen}")
     refused = history.increase(status, [f"refused_{reason.value}" for reason in Refusal])
     if refused:
         is_unmonitored = any(f"refused_{reason.value}" in refused for reason in UNMONITORED)
         counts = ", ".join(f"{count} {name.removeprefix('refused_')}" for name, count in refused.items())
-        level = Level.ERROR if is_unmonitored else Level.WARN
+        level = DiagnosticLevel.ERROR if is_unmonitored else DiagnosticLevel.WARN
         findings.add(level, f"refused lately: {counts} (last: {status.last_refusal})")
     for count in history.increase(status, ["messages_lost"]).values():
-        findings.add(Level.WARN, f"lost lately: {count} messages on {facts.topic}")
+        findings.add(DiagnosticLevel.WARN, f"lost lately: {count} messages on {facts.topic}")
     if not status.objects:
-        findings.add(Level.WARN, "no object is described")
+        findings.add(DiagnosticLevel.WARN, "no object is described")
     names = ("objects", "objects_static", "objects_unseen", "objects_stale", "messages_lost")
     counters = (*names, *(f"refused_{reason.value}" for reason in Refusal))
     values = {"silence [s]": facts.silence, **{name: getattr(status, name) for name in counters}}
     return findings.report("inputs", f"{status.objects} objects, all up to date", values)
 
 
-def _steps(facts: Facts, history: History) -> Report:
+def _steps(facts: NodeFacts, history: LastReports) -> Report:
     status, findings = facts.status, _Findings()
     if status.latency > facts.stale_after:
-        findings.add(Level.ERROR, f"late: the answers are {status.latency:.2f} s behind the stamps of their states")
+        findings.add(
+            DiagnosticLevel.ERROR, f"late: the answers are {status.latency:.2f} s behind the stamps of their states"
+        )
     elif math.isnan(status.latency) and status.step:
-        findings.add(Level.WARN, "the latency is unknown, because the stamps of the states are from another clock")
+        findings.add(
+            DiagnosticLevel.WARN, "the latency is unknown, because the stamps of the states are from another clock"
+        )
     if facts.unresolved:
-        findings.add(Level.WARN, f"unresolved: up to {facts.unresolved} pairs in a step; treat them as colliding")
+        findings.add(
+            DiagnosticLevel.WARN, f"unresolved: up to {facts.unresolved} pairs in a step; treat them as colliding"
+        )
     if facts.deferred:
-        findings.add(Level.WARN, f"deferred: the budget ran out, up to {facts.deferred} pairs in a step")
+        findings.add(DiagnosticLevel.WARN, f"deferred: the budget ran out, up to {facts.deferred} pairs in a step")
     if count := history.outdated(facts):
-        findings.add(Level.WARN, f"slower than the states: {count} outdated messages left out lately")
+        findings.add(DiagnosticLevel.WARN, f"slower than the states: {count} outdated messages left out lately")
     if facts.is_reduced:
-        findings.add(Level.WARN, f"reduced effort: profile {status.profile}")
+        findings.add(DiagnosticLevel.WARN, f"reduced effort: profile {status.profile}")
     if status.rate > 1.0 and status.step_duration_p99 * status.rate > 1.0:
         findings.add(
-            Level.WARN,
+            DiagnosticLevel.WARN,
             f"slow: 1 % of the steps take {status.step_duration_p99 * 1e3:.1f} ms or more at {status.rate:.0f} Hz",
         )
     values = {
@@ -202,28 +209,28 @@ def _steps(facts: Facts, history: History) -> Report:
     return findings.report("steps", f"{status.rate:.0f} steps/s" if status.step else "no step yet", values)
 
 
-def _recording(status: MonitorStatus, history: History) -> Report:
+def _recording(status: MonitorStatus, history: LastReports) -> Report:
     findings = _Findings()
-    if status.recording == Recording.FAILED:
-        findings.add(Level.WARN, f"the recording failed, the monitoring goes on: {status.recording_error}")
+    if status.recording == RecordingState.FAILED:
+        findings.add(DiagnosticLevel.WARN, f"the recording failed, the monitoring goes on: {status.recording_error}")
     else:
         for count in history.increase(status, ["recording_dropped"]).values():
-            findings.add(Level.WARN, f"the disk is too slow: {count} messages dropped lately")
-    is_on = status.recording == Recording.ON
+            findings.add(DiagnosticLevel.WARN, f"the disk is too slow: {count} messages dropped lately")
+    is_on = status.recording == RecordingState.ON
     names = ("recording_path", "recorded_messages", "recorded_bytes", "recording_dropped")
     values = {name: getattr(status, name) for name in names}
     return findings.report("recording", f"recording to {status.recording_path}" if is_on else "not recording", values)
 
 
-def _sources(lines: tuple[LineReport, ...], history: History) -> Report:
+def _sources(lines: tuple[LineReport, ...], history: LastReports) -> Report:
     findings = _Findings()
     for line in lines:
-        if line.level == Level.ERROR:
-            findings.add(Level.ERROR, f"unusable: {line.text}")
+        if line.level == DiagnosticLevel.ERROR:
+            findings.add(DiagnosticLevel.ERROR, f"unusable: {line.text}")
         elif count := history.refused(line):
-            findings.add(Level.WARN, f"refused lately: {count} of {line.name} (last: {line.last_refusal})")
-        elif line.level == Level.WARN and not line.refused:
-            findings.add(Level.WARN, line.text)
+            findings.add(DiagnosticLevel.WARN, f"refused lately: {count} of {line.name} (last: {line.last_refusal})")
+        elif line.level == DiagnosticLevel.WARN and not line.refused:
+            findings.add(DiagnosticLevel.WARN, line.text)
     refused = sum({line.name: line.refused for line in lines}.values())  # a robot has several lines
     values: dict[str, object] = {"messages": sum(line.messages for line in lines), "refused": refused}
     return findings.report("sources", f"{len(lines)} topics", values)

@@ -6,7 +6,7 @@ from enum import IntEnum
 from typing import NamedTuple
 
 
-class Level(IntEnum):
+class DiagnosticLevel(IntEnum):
     """The levels of DiagnosticStatus."""
 
     OK = 0
@@ -26,5 +26,5 @@ class LineReport(NamedTuple):
     refused: int
     last_refusal: str
     points_dropped: int
-    level: Level
+    level: DiagnosticLevel
     text: str

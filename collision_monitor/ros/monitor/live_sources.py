@@ -16,7 +16,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.pipeline.topics import SOURCES
 from collision_monitor.ros.endpoints import message_class
-from collision_monitor.ros.health.line_report import Level, LineReport
+from collision_monitor.ros.health.line_report import DiagnosticLevel, LineReport
 from collision_monitor.ros.names import is_topic_name
 from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.sources import Decoder, Feed, Input, Mapping, RawMessage
@@ -155,13 +155,13 @@ class LiveSources:
         states = sum(count for other, count in scene.states.items() if other == name or other.startswith(parts))
         problem = self._problems.get(name) or self._problems.get(topic)
         if problem:
-            level, text = Level.ERROR, problem
+            level, text = DiagnosticLevel.ERROR, problem
         elif topic not in self._found:
-            level, text = Level.WARN if topic not in _TF else Level.OK, f"{topic} has no publisher"
+            level, text = DiagnosticLevel.WARN if topic not in _TF else DiagnosticLevel.OK, f"{topic} has no publisher"
         elif not messages and topic not in _TF:
-            level, text = Level.WARN, f"no message on {topic} yet"
+            level, text = DiagnosticLevel.WARN, f"no message on {topic} yet"
         else:
-            level, text = (Level.WARN, refusal) if refused else (Level.OK, "ok")
+            level, text = (DiagnosticLevel.WARN, refusal) if refused else (DiagnosticLevel.OK, "ok")
         kind = self._found.get(topic, "")
         dropped = scene.points_dropped.get(name, 0)
         return LineReport(name, topic, kind, messages, states, refused, refusal, dropped, level, text)

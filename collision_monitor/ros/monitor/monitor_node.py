@@ -51,7 +51,7 @@ class MonitorNode(Managed, Node):
         self._configurations = 0
         self._bond = ManagerBond(self)
         Managed.__init__(self)
-        self._history = health.History()
+        self._history = health.LastReports()
         self._diagnostics = Diagnostics(self, self._health, self.settings.diagnostics)
 
     def _warm_up(self, stop: StopRequest) -> None:
@@ -94,7 +94,7 @@ class MonitorNode(Managed, Node):
     def cleanup(self) -> None:
         """Forget all objects and complete the recording."""
         self._monitoring = None
-        self._history = health.History()
+        self._history = health.LastReports()
         self._bond.dissolve()
         self._resources.close()
 

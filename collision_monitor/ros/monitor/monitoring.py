@@ -23,7 +23,7 @@ from collision_monitor.pipeline.shape_intake import TakenShapes
 from collision_monitor.pipeline.topics import STATUS_PERIOD, Topic
 from collision_monitor.records import Phase
 from collision_monitor.ros.endpoints import answer_publisher, subscription
-from collision_monitor.ros.health.health import Facts
+from collision_monitor.ros.health.health import NodeFacts
 from collision_monitor.ros.health.refusal_log import RefusalLog, named
 from collision_monitor.ros.health.status_line import status_line
 from collision_monitor.ros.health.step_peaks import StepPeaks
@@ -346,11 +346,11 @@ class Monitoring:
         self._recording.write(Topic.STATUS, data, now, now)
         return data
 
-    def facts(self) -> Facts:
+    def facts(self) -> NodeFacts:
         """Return what the diagnostics report on. The peaks are those since the last call."""
         now, monitor = time.monotonic_ns(), self._pipeline.monitor
         deferred, unresolved = self._peaks.take()
-        return Facts(
+        return NodeFacts(
             status=codec.decode_status(self._status(now)),
             topic=self._states_in,
             silence=None if self._last_step is None else (now - self._last_step) * 1e-9,

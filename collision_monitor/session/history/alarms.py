@@ -47,7 +47,7 @@ class Alarms:
 
 
 @dataclass(frozen=True, eq=False)
-class Contacts:
+class CertainContacts:
     """The certain contacts of a record, which judge its alarms.
 
     times (S,): s of each step, never falling. horizon: s. known_until (S,): s, the end of the steps without a gap that
@@ -140,5 +140,5 @@ def _codes(keys: NDArray[np.uint64], pairs: NDArray[np.uint64], steps: Steps, co
 def alarms_of(history: History) -> Alarms:
     """Judge the alarms of a session by its own certain contacts."""
     h = history
-    contacts = Contacts.of(h.times, h.contacts, h.contact_step, h.profile.horizon, h.longest_step)
+    contacts = CertainContacts.of(h.times, h.contacts, h.contact_step, h.profile.horizon, h.longest_step)
     return contacts.judge(h.contacts, h.contact_step, h.predictions, h.prediction_step)

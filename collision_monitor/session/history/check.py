@@ -12,7 +12,7 @@ from typing import Any, Final
 from xml.etree import ElementTree
 
 from collision_monitor.alerts.rules import Rules
-from collision_monitor.session.history.expectations import ExpectationResult, evaluate, parse_expectations
+from collision_monitor.session.history.expectations import ExpectationResult, evaluate_expectations, parse_expectations
 from collision_monitor.session.history.read_history import read_history
 from collision_monitor.session.many import ALL_CORES, Engine, for_each
 from collision_monitor.session.reader import Session
@@ -47,7 +47,7 @@ def check_session(
     """
     begin = time.perf_counter()
     history = read_history(Session(path), with_profile, rules=rules)
-    outcomes = evaluate(parse_expectations(expectations), history, lambda: replay_verdict(path))
+    outcomes = evaluate_expectations(parse_expectations(expectations), history, lambda: replay_verdict(path))
     return Checked(str(path), outcomes, seconds=time.perf_counter() - begin)
 
 

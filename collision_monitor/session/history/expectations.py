@@ -71,7 +71,9 @@ def parse_expectations(content: Any) -> list[Expectation]:
     return [_parse(k, each) for k, each in enumerate(content["expect"], start=1)]
 
 
-def evaluate(expectations: list[Expectation], history: History, replay: Callable[[], str]) -> list[ExpectationResult]:
+def evaluate_expectations(
+    expectations: list[Expectation], history: History, replay: Callable[[], str]
+) -> list[ExpectationResult]:
     """Return the result of each expectation. replay: replays the session and returns its verdict, if that is needed."""
     outcomes = []
     for each in expectations:

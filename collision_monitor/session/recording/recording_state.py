@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import IntEnum
 
 
-class Recording(IntEnum):
+class RecordingState(IntEnum):
     """Values of `MonitorStatus.recording`."""
 
     OFF = 0

@@ -23,7 +23,7 @@ MOST_TEXTS: Final = 1000
 _OTHERS: Final = "refused for further reasons"
 
 
-class Scene:
+class SourceScene:
     """What the sources know.
 
     frame: the monitor's. frames: the tree of tf frames. waiting: the states since the last step. states: number of

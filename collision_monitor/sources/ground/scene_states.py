@@ -34,7 +34,7 @@ def turn_twists(states: States) -> None:
         states[field] = _turned(R_FB, states[field])
 
 
-def carry(states: States, frame: FrameMotion, covariance: Floats | None) -> Floats | None:
+def carry_states(states: States, frame: FrameMotion, covariance: Floats | None) -> Floats | None:
     """Bring states of a frame into that in which the frame moves. Return their covariances (N, 12).
 
     v_W = v_F + w_F x (R_WF p) + R_WF v, w_W = w_F + R_WF w. An acceleration is kept if the frame does not move, because

@@ -50,7 +50,7 @@ def plane_shape(plane: Any) -> Shape:
     return HalfSpace((a, b, c), -d)
 
 
-def scaled(shape: Shape, factor: float) -> Shape:
+def scaled_shape(shape: Shape, factor: float) -> Shape:
     """Return a shape scaled about its origin, a mesh about the mean of its vertices. Raises ShapeError."""
     match shape:
         case Box(size):

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol
 
-from collision_monitor.sources.ground.scene import Scene
+from collision_monitor.sources.ground.scene import SourceScene
 
 
 class RawMessage(NamedTuple):
@@ -32,16 +32,16 @@ class Source(Protocol):
     def topics(self) -> Mapping[str, tuple[str, ...]]:
         """The types that each topic may carry, such as `{"/joint_states": ("sensor_msgs/msg/JointState",)}`."""
 
-    def begin(self, scene: Scene) -> None:
+    def begin(self, scene: SourceScene) -> None:
         """Describe what is known before the first message. Called once. Raises InputError, SessionError."""
 
-    def take(self, topic: str, content: Any, stamp_ns: int, scene: Scene) -> None:
+    def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
         """Process a decoded message. What cannot be used is given to `scene.refuse`; nothing is raised.
 
         stamp_ns: the message's stamp, or its time of receipt if it has none or the file selects it.
         """
 
-    def settle(self, now_ns: int, scene: Scene) -> None:
+    def settle(self, now_ns: int, scene: SourceScene) -> None:
         """Write what waits, and remove what has expired. Called before each step, with the step's stamp.
 
         A source of many messages for each step decodes them in `take` and computes states here.

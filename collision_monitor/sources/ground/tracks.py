@@ -7,7 +7,7 @@ from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 from typing import Any, Final
 
-from collision_monitor.sources.ground.scene import Scene
+from collision_monitor.sources.ground.scene import SourceScene
 
 REMEMBERED: Final = 10_000
 """Vanished tracks whose ids are kept for their return."""
@@ -17,7 +17,7 @@ MOST_TRACKS: Final = 10_000
 
 
 @dataclass
-class Track:
+class DescribedTrack:
     """A track that is described. shape: what its last description was made from, None before the first."""
 
     object_id: int
@@ -33,8 +33,8 @@ class TrackTable:
     """
 
     def __init__(self, forget_after: float) -> None:
-        self._tracks: dict[Hashable, Track] = {}
-        self._vanished: OrderedDict[Hashable, Track] = OrderedDict()
+        self._tracks: dict[Hashable, DescribedTrack] = {}
+        self._vanished: OrderedDict[Hashable, DescribedTrack] = OrderedDict()
         self._forget_after = forget_after
 
     def __contains__(self, key: Hashable) -> bool:
@@ -47,7 +47,9 @@ class TrackTable:
             if (track := self._tracks.get(key)) is not None:
                 track.seen_ns = max(track.seen_ns, stamp_ns)
 
-    def get(self, key: Hashable, name: str, stamp_ns: int, scene: Scene, object_id: int | None = None) -> Track | None:
+    def get(
+        self, key: Hashable, name: str, stamp_ns: int, scene: SourceScene, object_id: int | None = None
+    ) -> DescribedTrack | None:
         """Return the track with this key, or a new one. None, after a refusal, if there are too many.
 
         name, object_id: of a new one; None: the next free id.
@@ -57,12 +59,14 @@ class TrackTable:
             if len(self._tracks) >= MOST_TRACKS:
                 scene.refuse(name, f"expected at most {MOST_TRACKS} objects of one entry")
                 return None
-            track = self._vanished.pop(key, None) or Track(scene.new_id() if object_id is None else object_id, name)
+            track = self._vanished.pop(key, None) or DescribedTrack(
+                scene.new_id() if object_id is None else object_id, name
+            )
             self._tracks[key] = track
         track.seen_ns = max(track.seen_ns, stamp_ns)
         return track
 
-    def drop(self, key: Hashable, scene: Scene) -> None:
+    def drop(self, key: Hashable, scene: SourceScene) -> None:
         """Remove the track with this key, if there is one."""
         track = self._tracks.pop(key, None)
         if track is None:
@@ -73,7 +77,7 @@ class TrackTable:
         if len(self._vanished) > REMEMBERED:
             self._vanished.popitem(last=False)
 
-    def expire(self, now_ns: int, scene: Scene) -> None:
+    def expire(self, now_ns: int, scene: SourceScene) -> None:
         """Remove the tracks that have not been seen for `forget_after`."""
         if not self._tracks:
             return

@@ -21,10 +21,10 @@ from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.prisms import prism
-from collision_monitor.sources.ground.scene import Scene
-from collision_monitor.sources.ground.scene_states import carry, empty_states, turn_twists, turned_triangles
+from collision_monitor.sources.ground.scene import SourceScene
+from collision_monitor.sources.ground.scene_states import carry_states, empty_states, turn_twists, turned_triangles
 from collision_monitor.sources.ground.track_shapes import Measured, held_by, rounded_up, still_held
-from collision_monitor.sources.ground.tracks import Track, TrackTable
+from collision_monitor.sources.ground.tracks import DescribedTrack, TrackTable
 from collision_monitor.sources.messages.autoware_bytes import POLYGON, TrackArrays
 
 TRACKED: Final = "autoware_perception_msgs/msg/TrackedObjects"
@@ -38,7 +38,7 @@ _LABELS: Final = (
 )
 
 
-Found = tuple[Track, int]
+Found = tuple[DescribedTrack, int]
 """A track and its row in a message."""
 
 
@@ -54,10 +54,10 @@ class AutowareSource:
         self._tracks = TrackTable(entry.forget_after)
         self._number = 0
 
-    def begin(self, scene: Scene) -> None:
+    def begin(self, scene: SourceScene) -> None:
         """See Source. A track is described when it appears."""
 
-    def take(self, topic: str, content: TrackArrays, stamp_ns: int, scene: Scene) -> None:
+    def take(self, topic: str, content: TrackArrays, stamp_ns: int, scene: SourceScene) -> None:
         """See Source."""
         entry = self._entry
         frame = scene.locate(entry.name, frame_name(content.header.frame_id), stamp_ns)
@@ -76,20 +76,20 @@ class AutowareSource:
         kept = self._described([(track, row) for track, row in found if track is not None], content, scene)
         if kept:
             states, covariance = self._states(kept, content, scene)
-            given = covariance if frame is IDENTITY else carry(states, frame, covariance)
+            given = covariance if frame is IDENTITY else carry_states(states, frame, covariance)
             scene.observe(states, stamp_ns, given)
 
-    def settle(self, now_ns: int, scene: Scene) -> None:
+    def settle(self, now_ns: int, scene: SourceScene) -> None:
         """See Source."""
         self._tracks.expire(now_ns, scene)
 
-    def _track(self, key: bytes, label: int, stamp_ns: int, scene: Scene) -> Track | None:
+    def _track(self, key: bytes, label: int, stamp_ns: int, scene: SourceScene) -> DescribedTrack | None:
         if key not in self._tracks:
             self._number += 1
         word = _LABELS[label] if label < len(_LABELS) else f"label{label}"
         return self._tracks.get(key, f"{self._entry.name}_{word}_{self._number}", stamp_ns, scene)
 
-    def _described(self, found: list[Found], content: TrackArrays, scene: Scene) -> list[Found]:
+    def _described(self, found: list[Found], content: TrackArrays, scene: SourceScene) -> list[Found]:
         """Describe the tracks that are new or have left their described shapes. Return those that are described."""
         entry, tolerance = self._entry, self._entry.shape_tolerance
         kinds, sizes = _measured(content)
@@ -105,7 +105,7 @@ class AutowareSource:
                 kept.append((track, row))
         return kept
 
-    def _describe(self, track: Track, measured: Measured, corners: Any, scene: Scene) -> bool:
+    def _describe(self, track: DescribedTrack, measured: Measured, corners: Any, scene: SourceScene) -> bool:
         """Describe one track. Return whether it is described."""
         entry, tolerance = self._entry, self._entry.shape_tolerance
         if measured[0] == POLYGON and not entry.each:
@@ -122,7 +122,7 @@ class AutowareSource:
         track.shape = described
         return True
 
-    def _states(self, kept: list[Found], content: TrackArrays, scene: Scene) -> tuple[Any, Any]:
+    def _states(self, kept: list[Found], content: TrackArrays, scene: SourceScene) -> tuple[Any, Any]:
         """Return states in the frame of the message, with covariances or None."""
         states = empty_states([track.object_id for track, _ in kept])
         rows = np.array([row for _, row in kept])
@@ -138,7 +138,7 @@ class AutowareSource:
         return states, covariance
 
     def _covariances(
-        self, states: Any, content: TrackArrays, rows: NDArray[np.int64], scene: Scene
+        self, states: Any, content: TrackArrays, rows: NDArray[np.int64], scene: SourceScene
     ) -> NDArray[np.float64] | None:
         pose = usable_blocks(content.pose_covariance[rows])
         twist = usable_blocks(content.twist_covariance[rows])

@@ -19,7 +19,7 @@ from collision_monitor.shapes.shapes import MOST_CLOUD_POINTS, Points
 from collision_monitor.sources.ground.frames import frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
-from collision_monitor.sources.ground.scene import Scene
+from collision_monitor.sources.ground.scene import SourceScene
 from collision_monitor.sources.ground.yaml_table import known
 
 SCAN: Final = "sensor_msgs/msg/LaserScan"
@@ -49,17 +49,17 @@ class CloudSource:
         self.topics = {entry.topic: (message_type,)}
         self._entry = entry
 
-    def begin(self, scene: Scene) -> None:
+    def begin(self, scene: SourceScene) -> None:
         """See Source. The first scan describes the object."""
 
-    def take(self, topic: str, content: Any, stamp_ns: int, scene: Scene) -> None:
+    def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
         """See Source."""
         entry = self._entry
         frame = scene.locate(entry.name, frame_name(content.header.frame_id), stamp_ns)
         if frame is None:
             return
         try:
-            points, lost = cloud_points(content) if hasattr(content, "point_step") else scan_points(content)
+            points, lost = read_cloud_points(content) if hasattr(content, "point_step") else scan_points(content)
         except InputError as error:
             scene.refuse(entry.name, str(error))
             return
@@ -82,7 +82,7 @@ class CloudSource:
         except CollisionMonitorError as error:
             scene.refuse(entry.name, str(error))
 
-    def _on_robot(self, cloud: Points, at: Pose, stamp_ns: int, scene: Scene) -> NDArray[np.bool_]:
+    def _on_robot(self, cloud: Points, at: Pose, stamp_ns: int, scene: SourceScene) -> NDArray[np.bool_]:
         """Which points (N,) are on an object that is left out. Raises InputError if it is not known where one is."""
         on = np.zeros(len(cloud.points), np.bool_)
         for name in self._entry.without:
@@ -94,7 +94,7 @@ class CloudSource:
                 on |= points_within(cloud, at, description.shapes, pose, limit)
         return on
 
-    def settle(self, now_ns: int, scene: Scene) -> None:
+    def settle(self, now_ns: int, scene: SourceScene) -> None:
         """See Source."""
 
 
@@ -108,7 +108,7 @@ def scan_points(scan: Any) -> tuple[Floats, int]:
     return points, int(np.count_nonzero(np.isnan(ranges)))
 
 
-def cloud_points(cloud: Any) -> tuple[Floats, int]:
+def read_cloud_points(cloud: Any) -> tuple[Floats, int]:
     """Return the finite points (N, 3) in m of a PointCloud2 in its frame, and the number of the others.
 
     Raises InputError if it has no x, y and z.

@@ -20,10 +20,10 @@ from collision_monitor.sources.ground.covariances import usable_blocks
 from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
-from collision_monitor.sources.ground.scene import Scene
-from collision_monitor.sources.ground.scene_states import carry, empty_states
+from collision_monitor.sources.ground.scene import SourceScene
+from collision_monitor.sources.ground.scene_states import carry_states, empty_states
 from collision_monitor.sources.ground.track_shapes import held_by, rounded_up
-from collision_monitor.sources.ground.tracks import Track, TrackTable
+from collision_monitor.sources.ground.tracks import DescribedTrack, TrackTable
 from collision_monitor.sources.messages.poses import worst_stddev
 
 DETECTIONS: Final = "vision_msgs/msg/Detection3DArray"
@@ -52,10 +52,10 @@ class DetectionSource:
         self._last: dict[Key, tuple[int, NDArray[np.float64], NDArray[np.float64]]] = {}  # stamp, position, velocity
         self._number = 0
 
-    def begin(self, scene: Scene) -> None:
+    def begin(self, scene: SourceScene) -> None:
         """See Source. An object is described when it is first detected."""
 
-    def take(self, topic: str, content: Any, stamp_ns: int, scene: Scene) -> None:
+    def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
         """See Source."""
         entry = self._entry
         frame = scene.locate(entry.name, frame_name(content.header.frame_id), stamp_ns)
@@ -77,7 +77,7 @@ class DetectionSource:
         if entry.covariance:
             self._put_uncertainty(states, found, scene)
         if frame is not IDENTITY:
-            carry(states, frame, None)
+            carry_states(states, frame, None)
         kept = []
         keys = self._keys(found, states["position"], stamp_ns, scene)
         for k, key in enumerate(keys):
@@ -89,7 +89,7 @@ class DetectionSource:
         if kept:
             scene.observe(states[kept], stamp_ns, window=entry.estimate_over or WINDOW)
 
-    def settle(self, now_ns: int, scene: Scene) -> None:
+    def settle(self, now_ns: int, scene: SourceScene) -> None:
         """See Source."""
         self._tracks.expire(now_ns, scene)
         here = set(self._tracks.all_keys())
@@ -98,7 +98,7 @@ class DetectionSource:
 
     # -- which detection is which track
 
-    def _keys(self, found: list[Any], positions: Any, stamp_ns: int, scene: Scene) -> list[Key | None]:
+    def _keys(self, found: list[Any], positions: Any, stamp_ns: int, scene: SourceScene) -> list[Key | None]:
         """Return the key of the track of each detection; None for one whose id the message has twice."""
         keys: list[Key | None] = [None] * len(found)
         taken: set[Key] = set()
@@ -142,7 +142,7 @@ class DetectionSource:
 
     # -- what it is
 
-    def _describe(self, track: Track, each: Any, scene: Scene) -> bool:
+    def _describe(self, track: DescribedTrack, each: Any, scene: SourceScene) -> bool:
         entry = self._entry
         measured = 0, np.array([each.bbox.size.x, each.bbox.size.y, each.bbox.size.z])
         if track.shape is not None and (entry.each or held_by(track.shape, measured, entry.shape_tolerance)):
@@ -157,7 +157,7 @@ class DetectionSource:
         track.shape = described
         return True
 
-    def _put_uncertainty(self, states: Any, found: list[Any], scene: Scene) -> None:
+    def _put_uncertainty(self, states: Any, found: list[Any], scene: SourceScene) -> None:
         none = np.zeros(36)
         given = np.array([it.results[0].pose.covariance if it.results else none for it in found], np.float64)
         blocks = usable_blocks(given)

@@ -20,8 +20,8 @@ from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.prisms import prism
-from collision_monitor.sources.ground.scene import Scene
-from collision_monitor.sources.ground.scene_states import carry, empty_states
+from collision_monitor.sources.ground.scene import SourceScene
+from collision_monitor.sources.ground.scene_states import carry_states, empty_states
 
 FOOTPRINT: Final = "geometry_msgs/msg/PolygonStamped"
 
@@ -39,11 +39,11 @@ class FootprintSource:
         self._entry = entry
         self._corners: Floats | None = None  # (n, 2), in the object's frame
 
-    def begin(self, scene: Scene) -> None:
+    def begin(self, scene: SourceScene) -> None:
         """See Source. The first footprint describes the object."""
         scene.states[self._entry.name] = 0
 
-    def take(self, topic: str, content: Any, stamp_ns: int, scene: Scene) -> None:
+    def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
         """See Source."""
         entry = self._entry
         frame = scene.locate(entry.name, frame_name(content.header.frame_id), stamp_ns)
@@ -65,13 +65,13 @@ class FootprintSource:
         states["flags"] = StateFlag.TWIST_UNKNOWN
         states["position_stddev"] = entry.position_stddev
         if frame is not IDENTITY:
-            carry(states, frame, None)
+            carry_states(states, frame, None)
         scene.observe(states, stamp_ns, window=entry.estimate_over)
 
-    def settle(self, now_ns: int, scene: Scene) -> None:
+    def settle(self, now_ns: int, scene: SourceScene) -> None:
         """See Source."""
 
-    def _describe(self, corners: Floats, scene: Scene) -> bool:
+    def _describe(self, corners: Floats, scene: SourceScene) -> bool:
         entry, known = self._entry, self._corners
         same = known is not None and known.shape == corners.shape
         if known is not None and same and float(np.abs(known - corners).max()) <= entry.shape_tolerance:

@@ -12,9 +12,9 @@ from collision_monitor.shapes.shapes import Box, Cylinder, Shape, Sphere
 from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
-from collision_monitor.sources.ground.scene import Scene
-from collision_monitor.sources.ground.scene_states import carry, empty_states
-from collision_monitor.sources.ground.tracks import Track, TrackTable
+from collision_monitor.sources.ground.scene import SourceScene
+from collision_monitor.sources.ground.scene_states import carry_states, empty_states
+from collision_monitor.sources.ground.tracks import DescribedTrack, TrackTable
 from collision_monitor.sources.messages.poses import put_pose
 
 MARKER: Final = "visualization_msgs/msg/Marker"
@@ -42,10 +42,10 @@ class MarkerSource:
         self._tracks = TrackTable(entry.forget_after if "forget_after" in entry.given else math.inf)
         self._ends: dict[tuple[str, int], int] = {}  # ns at which a lifetime ends
 
-    def begin(self, scene: Scene) -> None:
+    def begin(self, scene: SourceScene) -> None:
         """See Source. A marker is described when it appears."""
 
-    def take(self, topic: str, content: Any, stamp_ns: int, scene: Scene) -> None:
+    def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
         """See Source."""
         for marker in content.markers if hasattr(content, "markers") else (content,):
             key = marker.ns, marker.id
@@ -57,7 +57,7 @@ class MarkerSource:
             elif self._is_ours(key):
                 self._show(marker, scene.stamp_of(marker.header, stamp_ns), scene)
 
-    def settle(self, now_ns: int, scene: Scene) -> None:
+    def settle(self, now_ns: int, scene: SourceScene) -> None:
         """See Source."""
         self._tracks.expire(now_ns, scene)
         for key in [key for key, end in self._ends.items() if end < now_ns]:
@@ -70,7 +70,7 @@ class MarkerSource:
 
         return selects(self._entry.marker) and not any(map(selects, self._before))
 
-    def _show(self, marker: Any, stamp_ns: int, scene: Scene) -> None:
+    def _show(self, marker: Any, stamp_ns: int, scene: SourceScene) -> None:
         entry, key = self._entry, (marker.ns, marker.id)
         is_one = entry.marker == key
         name = entry.name if is_one else f"{entry.name}_{marker.id}"
@@ -93,14 +93,14 @@ class MarkerSource:
         states = empty_states([track.object_id])
         put_pose(states, marker.pose)
         if frame is not IDENTITY:
-            carry(states, frame, None)
+            carry_states(states, frame, None)
         self._describe(track, shapes, states, scene)
         if not entry.static:
             states["flags"] = StateFlag.TWIST_UNKNOWN
             states["position_stddev"] = entry.position_stddev
             scene.observe(states, stamp_ns, window=entry.estimate_over)
 
-    def _describe(self, track: Track, shapes: Any, states: Any, scene: Scene) -> None:
+    def _describe(self, track: DescribedTrack, shapes: Any, states: Any, scene: SourceScene) -> None:
         shown = [repr(shape) for shape, _ in shapes], states[0].tobytes() if self._entry.static else None
         if shown == track.shape:
             return

@@ -13,8 +13,14 @@ from collision_monitor.sources.ground.covariances import Blocks, usable_blocks, 
 from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
-from collision_monitor.sources.ground.scene import Scene
-from collision_monitor.sources.ground.scene_states import carry, empty_states, squares, turn_twists, turned_triangles
+from collision_monitor.sources.ground.scene import SourceScene
+from collision_monitor.sources.ground.scene_states import (
+    carry_states,
+    empty_states,
+    squares,
+    turn_twists,
+    turned_triangles,
+)
 from collision_monitor.sources.ground.yaml_table import SHAPES
 
 ODOMETRY: Final = "nav_msgs/msg/Odometry"
@@ -31,10 +37,10 @@ class PoseSource:
         self.topics = {entry.topic: (message_type,)}
         self._entry = entry
 
-    def begin(self, scene: Scene) -> None:
+    def begin(self, scene: SourceScene) -> None:
         """See Source. The feed describes entries with a shape."""
 
-    def take(self, topic: str, content: Any, stamp_ns: int, scene: Scene) -> None:
+    def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
         """See Source."""
         entry = self._entry
         twist = getattr(content, "twist", None)
@@ -72,13 +78,13 @@ class PoseSource:
         elif np.isnan(covariance).any():
             given = None
         if frame is not IDENTITY:
-            given = carry(states, frame, given)
+            given = carry_states(states, frame, given)
         scene.observe(states, stamp_ns, given, window=entry.estimate_over)
 
-    def settle(self, now_ns: int, scene: Scene) -> None:
+    def settle(self, now_ns: int, scene: SourceScene) -> None:
         """See Source."""
 
-    def _blocks(self, part: Any, what: str, scene: Scene) -> Blocks:
+    def _blocks(self, part: Any, what: str, scene: SourceScene) -> Blocks:
         found = usable_blocks(np.asarray(part.covariance, np.float64).reshape(1, 36))
         if not found.valid[0]:
             scene.refuse(

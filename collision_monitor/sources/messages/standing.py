@@ -8,7 +8,7 @@ from typing import Any
 from collision_monitor.shapes.pose import Pose, multiply, rotation_matrix
 from collision_monitor.sources.ground.frames import FrameMotion
 from collision_monitor.sources.ground.object_entry import ObjectEntry
-from collision_monitor.sources.ground.scene import Scene
+from collision_monitor.sources.ground.scene import SourceScene
 
 
 class StandingObjects:
@@ -18,17 +18,17 @@ class StandingObjects:
         self.topics: Mapping[str, tuple[str, ...]] = {}
         self._waiting = entries
 
-    def begin(self, scene: Scene) -> None:
+    def begin(self, scene: SourceScene) -> None:
         """See Source. Describes the objects in the monitor's frame."""
         ours = [entry for entry in self._waiting if entry.frame in ("", scene.frame)]
         self._waiting = [entry for entry in self._waiting if entry not in ours]
         for entry in ours:
             scene.describe(entry.describe(at=entry.pose or Pose()))
 
-    def take(self, topic: str, content: Any, stamp_ns: int, scene: Scene) -> None:
+    def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
         """See Source. It has no topics."""
 
-    def settle(self, now_ns: int, scene: Scene) -> None:
+    def settle(self, now_ns: int, scene: SourceScene) -> None:
         """See Source. Describes the objects whose frames are known by now."""
         placed = []
         for entry in self._waiting:
@@ -39,7 +39,7 @@ class StandingObjects:
         if placed:
             self._waiting = [entry for entry in self._waiting if entry not in placed]
 
-    def misplaced(self, scene: Scene) -> list[str]:
+    def misplaced(self, scene: SourceScene) -> list[str]:
         """Return the reason for each object that is not described yet."""
         return [
             f"{entry.name}: expected static transforms from {scene.frame!r} to {entry.frame!r}; "

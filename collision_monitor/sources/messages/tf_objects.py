@@ -9,7 +9,7 @@ from collision_monitor.records import StateFlag
 from collision_monitor.sources.ground.frames import frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
-from collision_monitor.sources.ground.scene import Scene
+from collision_monitor.sources.ground.scene import SourceScene
 from collision_monitor.sources.ground.scene_states import empty_states
 from collision_monitor.sources.messages.poses import require_shape
 
@@ -30,10 +30,10 @@ class FrameSource:
         self.topics = {entry.topic: (message_type,)}
         self._entry = entry
 
-    def begin(self, scene: Scene) -> None:
+    def begin(self, scene: SourceScene) -> None:
         """See Source. The feed describes entries with a shape."""
 
-    def take(self, topic: str, content: Any, stamp_ns: int, scene: Scene) -> None:
+    def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
         """See Source. The feed has put the transforms into the tree; `stamp_ns` is that of the moved frame."""
         entry = self._entry
         frame = scene.locate(entry.name, entry.frame, stamp_ns)
@@ -45,10 +45,10 @@ class FrameSource:
         states["position_stddev"] = entry.position_stddev
         scene.observe(states, stamp_ns, window=entry.estimate_over)
 
-    def settle(self, now_ns: int, scene: Scene) -> None:
+    def settle(self, now_ns: int, scene: SourceScene) -> None:
         """See Source."""
 
-    def moved_by(self, content: Any, scene: Scene) -> Any:
+    def moved_by(self, content: Any, scene: SourceScene) -> Any:
         """Return the header of the transform in this message that moves the object; None if there is none."""
         return header_of(content, scene.frames.nearest_moving(self._entry.frame))
 

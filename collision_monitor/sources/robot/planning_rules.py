@@ -7,7 +7,7 @@ from typing import Any
 
 from collision_monitor.errors import CollisionMonitorError
 from collision_monitor.robots.srdf import ordered
-from collision_monitor.sources.ground.scene import Scene
+from collision_monitor.sources.ground.scene import SourceScene
 from collision_monitor.sources.robot.collision_matrix import CollisionMatrix
 from collision_monitor.sources.robot.link_rules import LinkRules
 
@@ -24,7 +24,7 @@ class PlanningRules:
         self._padding: dict[str, float] = {}
         self._scale: dict[str, float] = {}
 
-    def take(self, content: Any, scene: Scene) -> bool:
+    def take(self, content: Any, scene: SourceScene) -> bool:
         """Take over what a PlanningScene states; an empty list states nothing. Return whether a rule changed."""
         changed = False
         matrix = content.allowed_collision_matrix

@@ -16,7 +16,7 @@ from collision_monitor.shapes.pose import Pose
 from collision_monitor.sources.ground.frames import FrameMotion, MissingFrame
 from collision_monitor.sources.ground.mapping import Mapping as SourcesFile
 from collision_monitor.sources.ground.object_entry import ObjectEntry
-from collision_monitor.sources.ground.scene import Scene
+from collision_monitor.sources.ground.scene import SourceScene
 from collision_monitor.sources.robot.carried_bodies import Body
 from collision_monitor.sources.robot.collision_objects import (
     REMOVE,
@@ -87,10 +87,10 @@ class PlanningSceneSource:
         self._is_changed = False
         self._waits = False  # whether an object is not placed yet
 
-    def begin(self, scene: Scene) -> None:
+    def begin(self, scene: SourceScene) -> None:
         """See Source. The messages bring all objects."""
 
-    def take(self, topic: str, content: Any, stamp_ns: int, scene: Scene) -> None:
+    def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
         """See Source."""
         if hasattr(content, "world"):
             self._take_scene(content, stamp_ns, scene)
@@ -98,13 +98,13 @@ class PlanningSceneSource:
             self._change_world(content, scene)
         self._place(stamp_ns, scene, is_new=True)
 
-    def settle(self, now_ns: int, scene: Scene) -> None:
+    def settle(self, now_ns: int, scene: SourceScene) -> None:
         """See Source. Places the objects whose frames are known by now."""
         self._place(now_ns, scene, is_new=False)
 
     # -- messages
 
-    def _take_scene(self, content: Any, stamp_ns: int, scene: Scene) -> None:
+    def _take_scene(self, content: Any, stamp_ns: int, scene: SourceScene) -> None:
         objects = content.world.collision_objects
         if not content.is_diff:
             for name in sorted(self._world.keys() - {each.id for each in objects}):
@@ -126,7 +126,7 @@ class PlanningSceneSource:
         for each in attached:
             self._change_held(each, stamp_ns, scene)
 
-    def _change_world(self, message: Any, scene: Scene) -> None:
+    def _change_world(self, message: Any, scene: SourceScene) -> None:
         name = str(message.id)
         known = self._world.get(name)
         try:
@@ -145,13 +145,13 @@ class PlanningSceneSource:
             self._world[name] = WorldObject(self._id(name, scene), content)
             self._is_changed = True
 
-    def _drop(self, name: str, scene: Scene) -> None:
+    def _drop(self, name: str, scene: SourceScene) -> None:
         gone = self._world.pop(name, None)
         if gone is not None:
             scene.remove(gone.object_id)
             self._is_changed = True
 
-    def _change_held(self, message: Any, stamp_ns: int, scene: Scene) -> None:
+    def _change_held(self, message: Any, stamp_ns: int, scene: SourceScene) -> None:
         """Attach or detach an object. A detached one stays in the world where it is, as in MoveIt."""
         name, link = str(message.object.id), str(message.link_name)
         try:
@@ -177,7 +177,7 @@ class PlanningSceneSource:
         self._held[name] = HeldObject(self._id(name, scene), content, link, touch)
         self._is_changed = True
 
-    def _let_go(self, name: str, stamp_ns: int, scene: Scene) -> None:
+    def _let_go(self, name: str, stamp_ns: int, scene: SourceScene) -> None:
         held = self._held.pop(name, None)
         if held is None or self._robot is None:
             return
@@ -196,7 +196,7 @@ class PlanningSceneSource:
         content = CollisionObject(name, held.content.shapes, scene.frame, at)
         self._world[name] = WorldObject(held.object_id, content)
 
-    def _id(self, name: str, scene: Scene) -> int:
+    def _id(self, name: str, scene: SourceScene) -> int:
         """Return the id of an object, which it keeps when it is attached or comes again."""
         if name not in self._ids:
             if len(self._ids) >= 2 * MOST_OBJECTS:
@@ -206,7 +206,7 @@ class PlanningSceneSource:
 
     # -- the scene
 
-    def _place(self, now_ns: int, scene: Scene, *, is_new: bool) -> None:
+    def _place(self, now_ns: int, scene: SourceScene, *, is_new: bool) -> None:
         """Describe the objects whose frames are known. is_new: count those whose frames are not."""
         if not (is_new or self._waits or self._is_changed):
             return
@@ -234,7 +234,7 @@ class PlanningSceneSource:
             }
             robot.carry(bodies, self._carried_rules(robot.link_ids), scene)
 
-    def _place_in_world(self, name: str, it: WorldObject, now_ns: int, scene: Scene, is_new: bool) -> None:
+    def _place_in_world(self, name: str, it: WorldObject, now_ns: int, scene: SourceScene, is_new: bool) -> None:
         frame = scene.frames.motion(scene.frame, it.content.frame or scene.frame, now_ns)
         if isinstance(frame, MissingFrame):
             if is_new:
@@ -246,7 +246,7 @@ class PlanningSceneSource:
         except CollisionMonitorError as error:
             scene.refuse(self.name, f"{name:.80}: {error}")
 
-    def _offset(self, name: str, held: HeldObject, now_ns: int, scene: Scene, is_new: bool) -> Pose | None:
+    def _offset(self, name: str, held: HeldObject, now_ns: int, scene: SourceScene, is_new: bool) -> Pose | None:
         """Return the pose of an attached object in the frame of its link; None, after a refusal, if it is not known."""
         robot, frame = self._robot, held.content.frame
         assert robot is not None and robot.robot is not None

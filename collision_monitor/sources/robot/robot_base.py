@@ -12,7 +12,7 @@ from collision_monitor.robots.robot import Robot
 from collision_monitor.shapes.pose import Pose, from_rotation_vector, multiply
 from collision_monitor.sources.ground.covariances import usable_blocks
 from collision_monitor.sources.ground.frames import IDENTITY, FrameMotion, frame_name
-from collision_monitor.sources.ground.scene import Scene
+from collision_monitor.sources.ground.scene import SourceScene
 from collision_monitor.sources.ground.scene_states import empty_states, turn_twists
 from collision_monitor.sources.messages.poses import ODOMETRY, put_pose, worst_stddev
 from collision_monitor.sources.messages.tf_objects import TRANSFORMS, header_of
@@ -46,13 +46,13 @@ class RobotBase(Protocol):
     topics: Mapping[str, tuple[str, ...]]
     fresh: bool
 
-    def take(self, content: Any, stamp_ns: int, robot: Robot, scene: Scene) -> None:
+    def take(self, content: Any, stamp_ns: int, robot: Robot, scene: SourceScene) -> None:
         """Process a decoded message."""
 
-    def moved_by(self, content: Any, robot: Robot, scene: Scene) -> Any:
+    def moved_by(self, content: Any, robot: Robot, scene: SourceScene) -> Any:
         """Return the header of the transform in a TFMessage that moves the base; None if there is none."""
 
-    def motion(self, now_ns: int, robot: Robot, scene: Scene) -> BaseMotion | None:
+    def motion(self, now_ns: int, robot: Robot, scene: SourceScene) -> BaseMotion | None:
         """Return the motion of the base link; None, after a refusal, if it is not known."""
 
 
@@ -74,13 +74,13 @@ class FixedBase:
         self.fresh = True
         self._motion = BaseMotion(_at_rest(pose))
 
-    def take(self, content: Any, stamp_ns: int, robot: Robot, scene: Scene) -> None:
+    def take(self, content: Any, stamp_ns: int, robot: Robot, scene: SourceScene) -> None:
         """See RobotBase."""
 
-    def moved_by(self, content: Any, robot: Robot, scene: Scene) -> Any:
+    def moved_by(self, content: Any, robot: Robot, scene: SourceScene) -> Any:
         """See RobotBase."""
 
-    def motion(self, now_ns: int, robot: Robot, scene: Scene) -> BaseMotion:
+    def motion(self, now_ns: int, robot: Robot, scene: SourceScene) -> BaseMotion:
         """See RobotBase."""
         self.fresh = False
         return self._motion
@@ -94,18 +94,18 @@ class FrameBase:
         self.fresh = True
         self._entry = entry
 
-    def take(self, content: Any, stamp_ns: int, robot: Robot, scene: Scene) -> None:
+    def take(self, content: Any, stamp_ns: int, robot: Robot, scene: SourceScene) -> None:
         """See RobotBase. The feed has put the transforms into the tree."""
         self.fresh = True
 
-    def moved_by(self, content: Any, robot: Robot, scene: Scene) -> Any:
+    def moved_by(self, content: Any, robot: Robot, scene: SourceScene) -> Any:
         """See RobotBase."""
         return header_of(content, scene.frames.nearest_moving(self._frame(robot)))
 
     def _frame(self, robot: Robot) -> str:
         return self._entry.base.frame or self._entry.base.link or robot.tree.links[0]
 
-    def motion(self, now_ns: int, robot: Robot, scene: Scene) -> BaseMotion | None:
+    def motion(self, now_ns: int, robot: Robot, scene: SourceScene) -> BaseMotion | None:
         """See RobotBase."""
         name, base = self._entry.name, self._entry.base
         frame = self._frame(robot)
@@ -131,7 +131,7 @@ class OdometryBase:
         self._last: BaseMotion | None = None
         self._stamp = 0
 
-    def take(self, content: Any, stamp_ns: int, robot: Robot, scene: Scene) -> None:
+    def take(self, content: Any, stamp_ns: int, robot: Robot, scene: SourceScene) -> None:
         """See RobotBase."""
         name = self._entry.name
         frame = scene.locate(name, frame_name(content.header.frame_id), stamp_ns)
@@ -157,10 +157,10 @@ class OdometryBase:
         self._last = base
         self._stamp, self.fresh = stamp_ns, True
 
-    def moved_by(self, content: Any, robot: Robot, scene: Scene) -> Any:
+    def moved_by(self, content: Any, robot: Robot, scene: SourceScene) -> Any:
         """See RobotBase."""
 
-    def motion(self, now_ns: int, robot: Robot, scene: Scene) -> BaseMotion | None:
+    def motion(self, now_ns: int, robot: Robot, scene: SourceScene) -> BaseMotion | None:
         """See RobotBase. The base moves on at its twist since the message."""
         self.fresh = False
         age = now_ns - self._stamp
@@ -171,7 +171,7 @@ class OdometryBase:
         return _advanced(self._last, age * 1e-9)
 
 
-def _base_in_link(robot: Robot, link: str, what: str, scene: Scene) -> FrameMotion | None:
+def _base_in_link(robot: Robot, link: str, what: str, scene: SourceScene) -> FrameMotion | None:
     """Return the pose of the base link in a link that is rigid with it; None, after a refusal, for other links."""
     if link not in robot.tree.links:
         scene.refuse(what, f"expected the pose of a link of the robot, got {link!r:.80}; name it with `link: …`")
@@ -186,7 +186,7 @@ def _base_in_link(robot: Robot, link: str, what: str, scene: Scene) -> FrameMoti
     return _at_rest(Pose(poses[row, :3], poses[row, 3:])).inverse()
 
 
-def _is_near(base: BaseMotion, name: str, scene: Scene) -> bool:
+def _is_near(base: BaseMotion, name: str, scene: SourceScene) -> bool:
     """Return whether all numbers are finite and small enough for the monitor, else refuse the motion."""
     if (np.abs(base.row) <= LARGEST_INPUT).all():
         return True
@@ -211,7 +211,7 @@ def _advanced(base: BaseMotion, elapsed: float) -> BaseMotion:
     return BaseMotion(moved, stddev)
 
 
-def _stddev(odometry: Any, name: str, scene: Scene) -> Floats:
+def _stddev(odometry: Any, name: str, scene: SourceScene) -> Floats:
     """Return standard deviations (4,) along the worst axes from the covariances of a message; 0 where it has none."""
     found = []
     for part in (odometry.pose, odometry.twist):

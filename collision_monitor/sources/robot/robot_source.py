@@ -17,8 +17,8 @@ from collision_monitor.robots.robot import Description, Robot, make_robot
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.sources.ground.frames import FrameMotion
 from collision_monitor.sources.ground.mapping import Mapping
-from collision_monitor.sources.ground.scene import Scene
-from collision_monitor.sources.ground.solid_shapes import scaled
+from collision_monitor.sources.ground.scene import SourceScene
+from collision_monitor.sources.ground.solid_shapes import scaled_shape
 from collision_monitor.sources.robot.carried_bodies import Body, CarriedBodies
 from collision_monitor.sources.robot.collision_objects import pose_bytes, shape_bytes
 from collision_monitor.sources.robot.joint_table import JointTable
@@ -62,7 +62,7 @@ class RobotSource:
         self.topics: Table[str, tuple[str, ...]] = {
             topic: types for topic, types in {**topics, **self._base.topics}.items() if topic
         }
-        link_motions.load()
+        link_motions.load_link_motions()
         if entry.urdf is not None:
             try:
                 self._make(entry.urdf)
@@ -71,13 +71,13 @@ class RobotSource:
 
     # -- Source
 
-    def begin(self, scene: Scene) -> None:
+    def begin(self, scene: SourceScene) -> None:
         """See Source."""
         if self.robot is not None:
             self._report_problems(self.robot, scene)
             self._show(scene)
 
-    def take(self, topic: str, content: Any, stamp_ns: int, scene: Scene) -> None:
+    def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
         """See Source."""
         if topic in (self._entry.urdf_topic, self._entry.srdf_topic):
             self._take_text(topic, content.data, scene)
@@ -90,11 +90,11 @@ class RobotSource:
             if (reason := self._joints.take(content, stamp_ns)) is not None:
                 scene.refuse(self.name, f"{topic}: {reason}")
 
-    def moved_by(self, content: Any, scene: Scene) -> Any:
+    def moved_by(self, content: Any, scene: SourceScene) -> Any:
         """Return the header of the transform in a TFMessage that moves the base; None if there is none."""
         return None if self.robot is None else self._base.moved_by(content, self.robot, scene)
 
-    def settle(self, now_ns: int, scene: Scene) -> None:
+    def settle(self, now_ns: int, scene: SourceScene) -> None:
         """See Source. Observes the bodies about which there is news."""
         if self.robot is None or not (self._base.fresh or self._joints.fresh.any()):
             return
@@ -125,7 +125,7 @@ class RobotSource:
         """The objects of the links with shapes, by the links' names."""
         return {link: body.object_id for link, body in self._links.items()}
 
-    def carry(self, bodies: dict[str, Body], rules: LinkRules, scene: Scene) -> None:
+    def carry(self, bodies: dict[str, Body], rules: LinkRules, scene: SourceScene) -> None:
         """Carry these bodies, by name, from now on, and no others; use these rules for them and for the links.
 
         The caller removes the objects that are not carried any more.
@@ -135,7 +135,7 @@ class RobotSource:
         self.attached, self._rules = bodies, rules
         self._show(scene)
 
-    def link_motion(self, link: str, now_ns: int, scene: Scene) -> FrameMotion | None:
+    def link_motion(self, link: str, now_ns: int, scene: SourceScene) -> FrameMotion | None:
         """Return the motion of a link in the monitor's frame; None if there is no such link or it is not known."""
         if self.robot is None or link not in self.robot.tree.links:
             return None
@@ -151,7 +151,7 @@ class RobotSource:
 
     # -- descriptions
 
-    def _take_text(self, topic: str, text: str, scene: Scene) -> None:
+    def _take_text(self, topic: str, text: str, scene: SourceScene) -> None:
         if topic == self._entry.urdf_topic:
             self._urdf = Description(text, topic)
         else:
@@ -168,11 +168,11 @@ class RobotSource:
         self._report_problems(robot, scene)
         self._show(scene)
 
-    def _forget(self, body: Body, scene: Scene) -> None:
+    def _forget(self, body: Body, scene: SourceScene) -> None:
         scene.remove(body.object_id)
         self._described.pop(body.object_id, None)
 
-    def _report_problems(self, robot: Robot, scene: Scene) -> None:
+    def _report_problems(self, robot: Robot, scene: SourceScene) -> None:
         for problem in robot.problems:
             scene.refuse(self.name, problem)
 
@@ -186,7 +186,7 @@ class RobotSource:
         self.robot = robot
         return robot
 
-    def _show(self, scene: Scene) -> None:
+    def _show(self, scene: SourceScene) -> None:
         """Describe the bodies that are new or have changed, and remove the links that are gone."""
         robot = self.robot
         assert robot is not None
@@ -207,7 +207,7 @@ class RobotSource:
             self._base.fresh = True
         self._describe(scene)
 
-    def _describe(self, scene: Scene) -> None:
+    def _describe(self, scene: SourceScene) -> None:
         assert self.robot is not None
         rules, bodies = self._rules, [*self._links.values(), *self.attached.values()]
         allowed = allowed_contacts(self.robot, self._links, self.attached, self._entry.allowed, rules)
@@ -235,7 +235,7 @@ class RobotSource:
         entry = self._entry
         return ObjectDescription(
             body.object_id,
-            [(shape if scale == 1.0 else scaled(shape, scale), pose) for shape, pose in body.shapes],
+            [(shape if scale == 1.0 else scaled_shape(shape, scale), pose) for shape, pose in body.shapes],
             name=body.name,
             static=at is not None,
             pose=at,
@@ -271,7 +271,7 @@ class RobotSource:
         twists: Floats,
         speed_known: NDArray[np.bool_],
         now_ns: int,
-        scene: Scene,
+        scene: SourceScene,
     ) -> None:
         states = self._moving.states(poses, twists)[chosen]
         if base.stddev.any():
@@ -282,7 +282,7 @@ class RobotSource:
         states["flags"][unknown] |= np.uint32(StateFlag.TWIST_UNKNOWN)
         scene.observe(states, now_ns)
 
-    def _refuse_unknown(self, names: Any, scene: Scene) -> None:
+    def _refuse_unknown(self, names: Any, scene: SourceScene) -> None:
         """Count each joint once that no robot of the file has."""
         assert self.robot is not None
         for name in names:

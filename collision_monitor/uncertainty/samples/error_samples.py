@@ -196,7 +196,7 @@ def orientation_spread(spread, i, radius, age, t, right):
 
 
 @inlined
-def turns(off):
+def errors_turn(off):
     """Whether errors turn a body; off: orientation_spread."""
     return off[0] + off[1] + off[3] > 0.0
 

@@ -164,7 +164,7 @@ def _turn(vectors, by, row, sign, order, first, last):
 
 
 @inlined
-def reach_of(table, s, R, o, n):
+def core_reach(table, s, R, o, n):
     """Support value (m) about its body's origin of the core of shape s, with rotation R and offset o (3,)."""
     if table.kind[s] == HALF_SPACE:
         return table.size[s, 3]
@@ -183,7 +183,7 @@ def stated_gap(table, pair, n, node, margin):
     """Gap (m) beyond the margin of the stated motion along the unit vector n (3,), in world axes, at a node (NODE)."""
     a, b = pair.a, pair.b
     p, R, o = node.position, node.rotation, node.offset
-    reach = reach_of(table, a, R[0], o[0], n) + reach_of(table, b, R[1], o[1], (-n[0], -n[1], -n[2]))
+    reach = core_reach(table, a, R[0], o[0], n) + core_reach(table, b, R[1], o[1], (-n[0], -n[1], -n[2]))
     return n[0] * p[0] + n[1] * p[1] + n[2] * p[2] - reach - rounding(table, a) - rounding(table, b) - margin
 
 
@@ -247,9 +247,9 @@ def _gaps_at(table, pair, plane, node, margin, turning, first, last, state, rows
     varies_a = mode != 0 and (turning[0] != NOT_TURNED or turned)
     varies_b = mode != 1 and (turning[1] != NOT_TURNED or turned)
     if not varies_a:
-        reach += reach_of(table, a, R[0], o[0], n)
+        reach += core_reach(table, a, R[0], o[0], n)
     if not varies_b:
-        reach += reach_of(table, b, R[1], o[1], (-nx, -ny, -nz))
+        reach += core_reach(table, b, R[1], o[1], (-nx, -ny, -nz))
     x, y, z = state[0, first:last], state[1, first:last], state[2, first:last]
     if turning[0] == NOT_TURNED and turning[1] == NOT_TURNED:
         stated = float32(nx * p[0] + ny * p[1] + nz * p[2] - reach)

@@ -53,7 +53,7 @@ def start(state: State) -> bool:
 
 
 @kernel
-def advance(state: State, until: float, events: int, log_times: Floats, log_pairs: Indices) -> int:
+def run_events(state: State, until: float, events: int, log_times: Floats, log_pairs: Indices) -> int:
     """Process the events up to the time `until` (s since the start), at most `events` of them; return the reason.
 
     log_times (n,), log_pairs (n, 2): filled with the collisions from row totals[LOGGED] on; n = 0 for no log. A wall

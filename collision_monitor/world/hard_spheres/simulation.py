@@ -15,10 +15,10 @@ from collision_monitor.world.hard_spheres.event_loop import (
     LOG_FULL,
     PAUSED,
     ROWS_FULL,
-    advance,
+    run_events,
     start,
 )
-from collision_monitor.world.hard_spheres.starting_points import overlapping, place, thermal
+from collision_monitor.world.hard_spheres.starting_points import overlapping_spheres, place_spheres, thermal
 from collision_monitor.world.hard_spheres.state import (
     COLLISIONS,
     EPOCH,
@@ -88,7 +88,7 @@ class HardSpheres:
         restitution = _restitution(restitution)
         random = np.random.default_rng(seed)
         masses = _masses(sizes)
-        positions = place(sizes, side, periodic, random)
+        positions = place_spheres(sizes, side, periodic, random)
         self._begin(positions, thermal(masses, periodic, random), sizes, side, periodic, 1.0)
         self._melt()
         self._begin(self.positions, self.velocities, sizes, side, periodic, restitution)
@@ -121,7 +121,7 @@ class HardSpheres:
         within = (1.0 - TOUCHING) * sizes
         if not periodic and not ((at >= within[:, None]) & (at <= side - within[:, None])).all():
             raise InputError(f"positions: expected all spheres between the walls at 0 and {side:g} m, got some outside")
-        pairs = overlapping(at, within, float(side) if periodic else None)
+        pairs = overlapping_spheres(at, within, float(side) if periodic else None)
         if len(pairs):
             raise InputError(f"positions: expected no overlaps, spheres {pairs[0, 0]} and {pairs[0, 1]} overlap")
         spheres = cls.__new__(cls)
@@ -148,7 +148,7 @@ class HardSpheres:
         left = EVENTS_AT_START * len(self.radii)
         while left > 0:
             part = min(left, EVENTS_PER_CALL)
-            if advance(self._state, math.inf, part, self._log_times, self._log_pairs) == ROWS_FULL:
+            if run_events(self._state, math.inf, part, self._log_times, self._log_pairs) == ROWS_FULL:
                 self._widen()
             left -= part
         if self._state.times[1] < math.inf:
@@ -172,7 +172,7 @@ class HardSpheres:
         parts: list[NDArray[np.void]] = []
         reason = PAUSED
         while reason != DONE:
-            reason = advance(self._state, until, EVENTS_PER_CALL, *log)
+            reason = run_events(self._state, until, EVENTS_PER_CALL, *log)
             if reason == ROWS_FULL:
                 self._widen()
             if reason == LOG_FULL or (record and reason == DONE):

@@ -20,7 +20,7 @@ PUSHES: Final = 2000
 Pairs = NDArray[np.intp]
 
 
-def place(radii: Floats, side: float, periodic: bool, random: np.random.Generator) -> Floats:
+def place_spheres(radii: Floats, side: float, periodic: bool, random: np.random.Generator) -> Floats:
     """Return centres (N, 3) of spheres without overlaps in a cube (m). Raises InputError if they do not fit.
 
     The spheres begin on random sites of a face-centred cubic lattice. Overlapping pairs are then pushed apart.
@@ -31,7 +31,7 @@ def place(radii: Floats, side: float, periodic: bool, random: np.random.Generato
     low, high = radii[:, None], side - radii[:, None]
     at = lattice * side if periodic else low + lattice / lattice.max(initial=1e-300) * (high - low)
     for _ in range(PUSHES):
-        pairs = overlapping(at, radii, side if periodic else None)
+        pairs = overlapping_spheres(at, radii, side if periodic else None)
         if not len(pairs):
             return at
         a, b = pairs.T
@@ -59,7 +59,7 @@ def _lattice(count: int, random: np.random.Generator) -> Floats:
     return np.asarray(sites.reshape(-1, 3)[chosen] / along)
 
 
-def overlapping(positions: Floats, radii: Floats, period: float | None) -> Pairs:
+def overlapping_spheres(positions: Floats, radii: Floats, period: float | None) -> Pairs:
     """Return the pairs (n, 2) of overlapping spheres; period: side of the cube with periodic walls (m)."""
     at = positions if period is None else np.mod(positions, period)
     at = np.where(at == period, 0.0, at)  # the remainder of a tiny negative number rounds up to the period

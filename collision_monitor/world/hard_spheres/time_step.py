@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from collision_monitor.world.hard_spheres.event_loop import DONE, EVENTS_PER_CALL, ROWS_FULL, advance, start
+from collision_monitor.world.hard_spheres.event_loop import DONE, EVENTS_PER_CALL, ROWS_FULL, run_events, start
 from collision_monitor.world.hard_spheres.state import VELOCITY, Floats, make_state, positions_at, with_wider_rows
 
 
@@ -22,7 +22,7 @@ def step_spheres(
     while not start(state):
         state = with_wider_rows(state)
     no_log = np.zeros(0), np.zeros((0, 2), np.int32)
-    while (reason := advance(state, dt, EVENTS_PER_CALL, *no_log)) != DONE:
+    while (reason := run_events(state, dt, EVENTS_PER_CALL, *no_log)) != DONE:
         if reason == ROWS_FULL:
             state = with_wider_rows(state)
     inside = np.clip(positions_at(state, dt), radii[:, None], side - radii[:, None])  # but for round-off

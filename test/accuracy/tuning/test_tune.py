@@ -22,7 +22,7 @@ from collision_monitor.accuracy.tuning import search_time
 from collision_monitor.accuracy.tuning.candidates import Space, models_of, with_threads
 from collision_monitor.accuracy.tuning.demands import Demands
 from collision_monitor.accuracy.tuning.halving import Trial, rungs_of
-from collision_monitor.accuracy.tuning.tiles import MOST_TRUTHS, Recording
+from collision_monitor.accuracy.tuning.tiles import MOST_TRUTHS, TuningInputs
 from collision_monitor.accuracy.tuning.tune import explain, parameter_file, space_of, tune
 from collision_monitor.cli.main import main
 from collision_monitor.cli.options.parameter_file import check_parameter_file
@@ -106,7 +106,7 @@ def test_a_long_search_gets_shorter_runs(work: Workload, monkeypatch: pytest.Mon
 def test_the_exact_answers_to_a_few_tiles_are_kept(work: Workload) -> None:
     steps = [(round(k * 1e8), work.steps[k % len(work.steps)][1]) for k in range(25 * (MOST_TRUTHS + 2))]
     profile = Profile(uncertainty=False)
-    recording = Recording.cut(work.descriptions, steps, profile, [profile.horizon])
+    recording = TuningInputs.cut(work.descriptions, steps, profile, [profile.horizon])
     assert recording.tiles == MOST_TRUTHS + 2
     (first,) = recording.measure(0, [profile], np.inf, lambda done: None)
     for tile in range(recording.tiles):

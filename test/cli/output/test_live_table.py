@@ -4,7 +4,7 @@ import numpy as np
 from rich.console import Console
 
 from collision_monitor import codec, records
-from collision_monitor.cli.output.live_table import Picture
+from collision_monitor.cli.output.live_table import LatestAnswers
 from collision_monitor.records import Phase, PredictionStatus
 
 NAMES = ["robot_1", "rack_7", "person_3"]
@@ -21,7 +21,7 @@ def picture(**status):
     impacts["lower"], impacts["upper"] = (0.25, 0.75), (np.inf, 0.76)
     impacts["status"] = (PredictionStatus.UNRESOLVED, PredictionStatus.HIT)
     ids = np.array([1, 7, 9], np.uint32)
-    return Picture(
+    return LatestAnswers(
         title="test",
         elapsed=3.0,
         contacts=codec.ContactArray(0, "world", 1, contacts, ids, NAMES),
@@ -66,6 +66,6 @@ def test_the_line_names_the_soonest_pair():
 
 
 def test_before_the_first_message():
-    empty = Picture("test", 0.0, None, None, codec.MonitorStatus())
+    empty = LatestAnswers("test", 0.0, None, None, codec.MonitorStatus())
     assert "0 touching, 0 predicted" in empty.line()
     assert "not recording" in drawn(empty)

@@ -11,7 +11,7 @@ from rational import POINTS_3D
 from scipy.optimize import linprog
 
 from collision_monitor.errors import InputError, ShapeError
-from collision_monitor.geometry.bounding_volumes import Aabb, BoundingSphere, Obb, aabb, kdop
+from collision_monitor.geometry.bounding_volumes import Aabb, BoundingSphere, Obb, aabb, kdop_of_points
 from collision_monitor.geometry.lecture.bounding_tests import (
     aabb_aabb,
     circle_circle,
@@ -21,7 +21,7 @@ from collision_monitor.geometry.lecture.bounding_tests import (
     obb_polygon,
     sphere_aabb,
     sphere_obb,
-    sphere_sphere,
+    spheres_overlap,
 )
 from collision_monitor.geometry.triangulation import triangulate
 
@@ -37,7 +37,7 @@ def test_spheres_and_circles(p, r, q, s, exponent):
     scale = 2.0**exponent
     distance2 = sum((x - y) ** 2 for x, y in zip(p, q, strict=True))
     a, b = sphere(np.array(p) * scale, r * scale), sphere(np.array(q) * scale, s * scale)
-    assert sphere_sphere(a, b) == sphere_sphere(b, a) == (distance2 <= (r + s) ** 2)
+    assert spheres_overlap(a, b) == spheres_overlap(b, a) == (distance2 <= (r + s) ** 2)
     flat2 = sum((x - y) ** 2 for x, y in zip(p[:2], q[:2], strict=True))
     assert circle_circle(sphere(p[:2], r), sphere(q[:2], s)) == (flat2 <= (r + s) ** 2)
 
@@ -86,7 +86,7 @@ FEW = st.lists(POINTS_3D, min_size=1, max_size=5)
 
 @given(FEW, FEW, st.sampled_from([6, 14, 18, 26]))
 def test_kdops(a, b, k):
-    first, second = kdop(a, k), kdop(b, k)
+    first, second = kdop_of_points(a, k), kdop_of_points(b, k)
     normals = np.round(first.directions / np.abs(first.directions).max(axis=1, keepdims=True)).astype(int)
     dots_a, dots_b = normals @ np.array(a).T, normals @ np.array(b).T
     apart = (dots_a.max(axis=1) < dots_b.min(axis=1)) | (dots_b.max(axis=1) < dots_a.min(axis=1))
@@ -95,14 +95,14 @@ def test_kdops(a, b, k):
 
 def test_kdops_of_different_directions_are_refused():
     with pytest.raises(InputError, match="same directions"):
-        kdop_kdop(kdop(SETS["cube"], 6), kdop(SETS["cube"], 14))
+        kdop_kdop(kdop_of_points(SETS["cube"], 6), kdop_of_points(SETS["cube"], 14))
 
 
 def test_arrays_of_volumes():
     rng = np.random.default_rng(0)
     centers, radii = rng.normal(size=(6, 1, 3)), rng.uniform(0, 1, (6, 1))
     a, b = BoundingSphere(centers, radii), BoundingSphere(rng.normal(size=(4, 3)), rng.uniform(0, 1, 4))
-    assert sphere_sphere(a, b).shape == (6, 4)
+    assert spheres_overlap(a, b).shape == (6, 4)
     boxes = Aabb(np.zeros((4, 3)), rng.uniform(0, 1, (4, 3)))
     overlap, closest = sphere_aabb(a, boxes)
     assert overlap.shape == (6, 4) and closest.shape == (6, 4, 3)

@@ -9,7 +9,7 @@ from named_features import agrees, off_feature, random_pose
 import collision_monitor as cm
 from collision_monitor import Pose
 from collision_monitor.query.contact.contact import contact
-from collision_monitor.query.contact.features import contact_features, feature_of, tie_of
+from collision_monitor.query.contact.features import contact_features, feature_of, shape_tie
 
 ROCK = cm.ConvexHull(np.random.default_rng(3).normal(size=(24, 3)) * 0.4)
 CUBE = cm.ConvexHull([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
@@ -115,7 +115,7 @@ def test_the_feature_contains_the_published_point(first, second):
             point = row[f"point_{side}"]
             assert off_feature(shape, (point - pose.position) @ pose.rotation, kind, index) < 2e-6
             off = min(float(row["error_bound"]), 1e-5)
-            expected = feature_of(shape, pose, point, sign * row["normal"], tie_of(a, b), off)
+            expected = feature_of(shape, pose, point, sign * row["normal"], shape_tie(a, b), off)
             assert agrees(shape, kind, index, expected), (kind, index, expected)
     assert overlapping > 5
 

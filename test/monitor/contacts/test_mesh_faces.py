@@ -12,7 +12,7 @@ from collision_monitor.errors import InputError
 from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.monitor.contacts.mesh_faces import MeshFaces
 from collision_monitor.monitor.state.snapshot import Snapshot
-from collision_monitor.query.contact.features import feature_of, tie_of
+from collision_monitor.query.contact.features import feature_of, shape_tie
 
 
 def ball_mesh(seed=2, n=40, radius=0.5):
@@ -62,7 +62,7 @@ def check(row, a, X, b, Y):
         point = row[f"point_{side}"]
         assert off_feature(shape, (point - pose.position) @ pose.rotation, kind, index) < 2e-6
         off = min(float(row["error_bound"]), 1e-5)
-        assert agrees(shape, kind, index, feature_of(shape, pose, point, sign * row["normal"], tie_of(a, b), off))
+        assert agrees(shape, kind, index, feature_of(shape, pose, point, sign * row["normal"], shape_tie(a, b), off))
 
 
 @pytest.mark.parametrize("other", OTHERS)

@@ -20,7 +20,7 @@ from collision_monitor.ros.endpoints import subscription
 from collision_monitor.session import Session
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.shapes import Box, Sphere
-from collision_monitor.view.scene import Scene
+from collision_monitor.view.scene import TopicContent
 
 SOURCES = """
 frame: map
@@ -37,7 +37,7 @@ class Watcher:
     """A viewer: the messages of both topics in the order of their arrival, and the scene that they make."""
 
     def __init__(self, team: Any) -> None:
-        self.scene = Scene()
+        self.scene = TopicContent()
         self.messages: list[tuple[Topic, bytes]] = []
         self._node = team.node
         self._subscriptions = [

@@ -14,7 +14,7 @@ from played_session import record_scene
 from collision_monitor import records
 from collision_monitor.cli.main import main
 from collision_monitor.records import Phase, PredictionStatus
-from collision_monitor.session.history.alarms import Alarms, Contacts
+from collision_monitor.session.history.alarms import Alarms, CertainContacts
 
 STEPS, PERIOD, HORIZON = 12, 0.1, 0.45
 
@@ -63,14 +63,14 @@ def test_counts_are_those_of_the_definition(touching, stated) -> None:
     predictions, prediction_steps = rows(records.PREDICTION, sorted(stated))
     for name, column in (("lower", 0), ("upper", 1)):
         predictions[name] = [stated[each][column] for each in sorted(stated)]
-    judge = Contacts.of(np.arange(STEPS) * PERIOD, contacts, contact_steps, HORIZON)
+    judge = CertainContacts.of(np.arange(STEPS) * PERIOD, contacts, contact_steps, HORIZON)
     found = judge.judge(contacts, contact_steps, predictions, prediction_steps)
     assert found == plainly(touching, stated)
 
 
 def test_flicker_changes_the_number_of_alarms_and_not_of_their_kind() -> None:
     """A prediction in every second step is half as many false alarms, not more of them."""
-    judge = Contacts.of(np.arange(STEPS) * PERIOD, *rows(records.CONTACT, []), HORIZON)
+    judge = CertainContacts.of(np.arange(STEPS) * PERIOD, *rows(records.CONTACT, []), HORIZON)
     lasting, flickering = (
         judge.judge(*rows(records.CONTACT, []), *rows(records.PREDICTION, [(1, s) for s in range(0, 6, k)]))
         for k in (1, 2)
@@ -82,7 +82,7 @@ def test_gaps_ends_and_possible_predictions() -> None:
     times = np.array([0.0, 0.1, 0.2, 5.0, 5.1])
     ended, at = rows(records.CONTACT, [(1, 3)])
     ended["phase"] = Phase.END
-    judge = Contacts.of(times, ended, at, HORIZON, longest_step=1.0)
+    judge = CertainContacts.of(times, ended, at, HORIZON, longest_step=1.0)
     predictions, steps = rows(records.PREDICTION, [(1, 2), (1, 3)])
     predictions["upper"] = np.inf
     assert judge.judge(ended, at, predictions, steps) == Alarms(alarms=2, open_alarms=2)

@@ -25,7 +25,7 @@ from collision_monitor.session import Recorder, Session
 from collision_monitor.session.history.check import Checked, check_sessions, junit_xml
 from collision_monitor.session.history.expectations import (
     ExpectationResult,
-    evaluate,
+    evaluate_expectations,
     parse_expectations,
     read_expectations,
 )
@@ -79,7 +79,7 @@ def yard(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def outcome(history: History, text: str, replay=lambda: "identical"):
-    (result,) = evaluate(parse_expectations({"expect": [yaml.safe_load(text)]}), history, replay)
+    (result,) = evaluate_expectations(parse_expectations({"expect": [yaml.safe_load(text)]}), history, replay)
     return result
 
 

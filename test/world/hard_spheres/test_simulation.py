@@ -12,14 +12,16 @@ from scipy import stats
 import collision_monitor as cm
 from collision_monitor.errors import InputError
 from collision_monitor.world.hard_spheres.simulation import carnahan_starling
-from collision_monitor.world.hard_spheres.starting_points import overlapping
+from collision_monitor.world.hard_spheres.starting_points import overlapping_spheres
 
 HardSpheres = cm.world.HardSpheres
 
 
 def overlaps(spheres, part=1e-12):
     """Pairs that overlap by more than this part of their radii."""
-    return overlapping(spheres.positions, spheres.radii * (1 - part), spheres.side if spheres.is_periodic else None)
+    return overlapping_spheres(
+        spheres.positions, spheres.radii * (1 - part), spheres.side if spheres.is_periodic else None
+    )
 
 
 @settings(max_examples=12)
