@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.world import make_scene
-from collision_monitor.world.hard_spheres.scene import HardSpheresScene
+from collision_monitor.world.hard_spheres.hard_spheres_scene import HardSpheresScene
 
 ROUND_OFF = 1e-9
 """s: stamps are whole nanoseconds."""

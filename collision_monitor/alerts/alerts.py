@@ -12,8 +12,8 @@ from collision_monitor.alerts.debounce import ENTRY, Conditions, Delays, Entries
 from collision_monitor.alerts.evaluation import evaluate_rule
 from collision_monitor.alerts.measures import Measures, Slots
 from collision_monitor.alerts.messages import AlertChange, Head, NameOf, measured, message
+from collision_monitor.alerts.monitored_bodies import MonitoredBodies
 from collision_monitor.alerts.rules import Rule, Rules
-from collision_monitor.alerts.scene import MonitoredBodies
 from collision_monitor.alerts.selection import Classes
 from collision_monitor.codec.alerts import AlertCause, CollisionAlert, CollisionAlertArray
 from collision_monitor.impact.impact_record import ids_of_keys

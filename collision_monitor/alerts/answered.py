@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.alerts.measures import Measures
-from collision_monitor.alerts.scene import MonitoredBodies
+from collision_monitor.alerts.monitored_bodies import MonitoredBodies
 from collision_monitor.impact.impact_record import pair_keys
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.records import ContactStatus, PredictionStatus

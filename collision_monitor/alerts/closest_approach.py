@@ -15,7 +15,7 @@ import numpy as np
 
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.alerts.measures import Array, Slots
-from collision_monitor.alerts.scene import MonitoredBodies
+from collision_monitor.alerts.monitored_bodies import MonitoredBodies
 from collision_monitor.impact.body_contact import RESULT, ContactQuery, body_contact
 from collision_monitor.impact.body_impact import make_scratch
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL

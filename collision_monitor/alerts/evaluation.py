@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from collision_monitor.alerts.answered import is_touching
 from collision_monitor.alerts.closest_approach import closest_approaches, sphere_approach
 from collision_monitor.alerts.measures import Array, Measures, Slots
-from collision_monitor.alerts.nearest import nearest_points_at
+from collision_monitor.alerts.monitored_bodies import MonitoredBodies
+from collision_monitor.alerts.nearest_points import nearest_points_at
 from collision_monitor.alerts.rules import Rule, Rules
-from collision_monitor.alerts.scene import MonitoredBodies
 from collision_monitor.alerts.selection import Classes, select
 from collision_monitor.alerts.thresholds import APPROACH
 from collision_monitor.alerts.traffic import post_encroachment_time, required_deceleration, time_headway

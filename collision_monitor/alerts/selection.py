@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.alerts.measures import Array, Measures, Slots
+from collision_monitor.alerts.monitored_bodies import MonitoredBodies
 from collision_monitor.alerts.rules import ANY, Rule, Rules
-from collision_monitor.alerts.scene import MonitoredBodies
 from collision_monitor.monitor.state.roster import Roster
 
 Mask = NDArray[np.bool_]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from collision_monitor.alerts.measures import Array, Slots
-from collision_monitor.alerts.scene import MonitoredBodies
+from collision_monitor.alerts.monitored_bodies import MonitoredBodies
 
 
 def required_deceleration(distance: Array, closing: Array) -> Array:

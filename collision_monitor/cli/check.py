@@ -91,7 +91,7 @@ def check_command(args: argparse.Namespace) -> int:
     """Run the command and return the exit code. Raises UsageError, InputError, SessionError, UnsupportedError."""
     from collision_monitor.session.history.check import check_sessions, junit_xml
     from collision_monitor.session.history.expectations import read_expectations
-    from collision_monitor.session.many import find_sessions
+    from collision_monitor.session.many_sessions import find_sessions
 
     engine = engine_of(args)
     check_profiles([args.replay or ""])

@@ -21,7 +21,7 @@ from collision_monitor.cli.output.progress import progress_bar
 
 if TYPE_CHECKING:
     from collision_monitor.session import Session
-    from collision_monitor.session.many import Engine
+    from collision_monitor.session.many_sessions import Engine
     from collision_monitor.session.replaying.replay_report import ReplayReport
 
 EPILOG = """\
@@ -82,7 +82,7 @@ def add_parser(subparsers: Any) -> None:
 def replay_command(args: argparse.Namespace) -> int:
     """Run the command and return the exit code. Raises UsageError, InputError, SessionError."""
     from collision_monitor.session import Session
-    from collision_monitor.session.many import find_sessions
+    from collision_monitor.session.many_sessions import find_sessions
     from collision_monitor.session.replaying.replay import replay
     from collision_monitor.settings.profile import Profile
 
@@ -134,7 +134,7 @@ def _unread(_path: Path, why: str) -> _Replayed:
 
 
 def _replay_many(paths: list[Path], args: argparse.Namespace, engine: Engine) -> int:
-    from collision_monitor.session.many import for_each
+    from collision_monitor.session.many_sessions import for_each
 
     found: list[_Replayed] = []
     with progress_bar("replay", len(paths)) as done:

@@ -89,8 +89,8 @@ def view_command(args: argparse.Namespace) -> int:
 def _view_session(args: argparse.Namespace, stop: StopRequest) -> None:
     from collision_monitor.session import Session
     from collision_monitor.view.player import Player
+    from collision_monitor.view.player_controls import PlayerControls
     from collision_monitor.view.recording import Recording
-    from collision_monitor.view.timeline import PlayerControls
     from collision_monitor.view.view import PERIOD, View
 
     session = Session(args.session)
@@ -120,8 +120,8 @@ def _view_session(args: argparse.Namespace, stop: StopRequest) -> None:
 
 
 def _view_live(args: argparse.Namespace, stop: StopRequest) -> None:
-    from collision_monitor.view.scene import TopicContent
     from collision_monitor.view.state_text import status_notes
+    from collision_monitor.view.topic_content import TopicContent
     from collision_monitor.view.view import PERIOD, View
 
     server = start_server(args.host, args.port)

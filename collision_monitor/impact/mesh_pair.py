@@ -16,7 +16,7 @@ from collision_monitor.meshes.distance.nearest import PLACE_A, PLACE_B, nearest_
 from collision_monitor.meshes.distance.solid import SolidMemory, solid_contact
 from collision_monitor.meshes.layout import CLOSED, FACE, MOST_PARTS, PARTS, WIDTH
 from collision_monitor.meshes.overlap.inside import INSIDE, OUTSIDE, is_either_in, locate_in_surface
-from collision_monitor.meshes.overlap.touching import contact_of_places
+from collision_monitor.meshes.overlap.touching_triangles import contact_of_places
 from collision_monitor.meshes.placing import inverse, relative
 from collision_monitor.narrow_phase.contact_row import (
     BOUND,

@@ -28,9 +28,9 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import PREDICTION, Method, PredictionStatus
 from collision_monitor.settings.profile import Profile
 from collision_monitor.uncertainty.impact_distribution import EARLIEST, MOST_LIKELY, PROBABILITY
-from collision_monitor.uncertainty.likely_impacts import LEFT, likely_impacts
 from collision_monitor.uncertainty.near_pairs import NearPairRange, find_near
 from collision_monitor.uncertainty.plane_memory import PlaneMemory, make_plane_memory
+from collision_monitor.uncertainty.plane_probability import LEFT, plane_probabilities
 from collision_monitor.uncertainty.samples.error_samples import Workspace, make_workspace
 from collision_monitor.uncertainty.samples.normal_samples import normal_samples, sample_columns
 from collision_monitor.uncertainty.spread import Spread, is_uncertain, make_spread, take_spread
@@ -227,7 +227,8 @@ class UncertainPredictions(Stage):
     def _near(self, step: StepContext) -> Records:
         """Return the entries of the pairs that could meet within the horizon."""
         p, found = step.profile, np.empty(len(self.entries), np.int64)
-        nearness = NearPairRange(sigmas_for(p.min_probability), step.settings.impact.margin, p.horizon, p.stale_acceleration)
+        sigmas = sigmas_for(p.min_probability)
+        nearness = NearPairRange(sigmas, step.settings.impact.margin, p.horizon, p.stale_acceleration)
         count = find_near(step.roster.multibody, self.spread, self.entries, step.now, nearness, found)
         return self.entries[found[:count]]
 
@@ -305,7 +306,7 @@ class UncertainPredictions(Stage):
         columns, multibody = sample_columns(step.profile.uncertainty_samples), step.roster.multibody
         exact, planes = self._workspaces[0]
         bounds = np.empty((len(slots), len(ANSWERS)))
-        likely_impacts(multibody, self.spread, slots, step.now, sampling, columns, planes, exact, bounds)
+        plane_probabilities(multibody, self.spread, slots, step.now, sampling, columns, planes, exact, bounds)
         return bounds
 
     def _judge(self, step: StepContext, slots: Pairs, stated: bool, pool: Pool) -> NDArray[np.float64]:
@@ -329,7 +330,7 @@ class UncertainPredictions(Stage):
 
             if p.impact_tolerance >= FINEST_WITH_PLANES:
                 exact, planes = work
-                followed = likely_impacts(
+                followed = plane_probabilities(
                     multibody, self.spread, slots, step.now, sampling, columns, planes, exact, answers
                 )
             left = answers[:, PROBABILITY] == LEFT

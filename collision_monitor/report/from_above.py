@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 
 from collision_monitor.report.facts import ReportFacts
 from collision_monitor.report.footprint import footprint
+from collision_monitor.report.object_tracks import ObjectTrack
 from collision_monitor.report.rendering import INK, PALETTE, Size, shortened
-from collision_monitor.report.tracks import ObjectTrack
 from collision_monitor.session.history.history import CollisionEvent, Floats, History
 
 if TYPE_CHECKING:

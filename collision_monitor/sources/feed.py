@@ -17,11 +17,11 @@ from collision_monitor.pipeline.topics import Topic
 from collision_monitor.sources.ground.frames import frame_name
 from collision_monitor.sources.ground.mapping import HEADER, Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
-from collision_monitor.sources.ground.scene import SourceScene
 from collision_monitor.sources.ground.source import RawMessage, Source
+from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.ground.waiting_states import Step
 from collision_monitor.sources.kinds import BY_TYPE, SECTIONS
-from collision_monitor.sources.messages.standing import StandingObjects
+from collision_monitor.sources.messages.static_objects import StandingObjects
 from collision_monitor.sources.messages.tf_objects import TRANSFORMS, FrameSource
 from collision_monitor.sources.robot.robot_source import RobotSource
 

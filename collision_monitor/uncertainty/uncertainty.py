@@ -46,17 +46,17 @@ from collision_monitor.uncertainty.samples.error_samples import (
     take_root,
     turn,
 )
-from collision_monitor.uncertainty.samples.foretold_samples import (
+from collision_monitor.uncertainty.samples.known_axes import parted_until, remember
+from collision_monitor.uncertainty.samples.normal_samples import DIMENSIONS, PILOT, pilot_of
+from collision_monitor.uncertainty.samples.skipped_samples import (
     OPEN,
     find_ends,
-    foretell,
+    predict_outcome,
     set_limits,
     set_widening,
     stand_for_skipped,
     weigh_followed,
 )
-from collision_monitor.uncertainty.samples.known_axes import parted_until, remember
-from collision_monitor.uncertainty.samples.normal_samples import DIMENSIONS, PILOT, pilot_of
 from collision_monitor.uncertainty.spread import (
     accelerates,
     is_uncertain,
@@ -509,7 +509,7 @@ def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers)
                     share[n], times[n] = 0.0, inf
                     seen += weights[n] if times[order[rank]] < inf else 0.0
                     continue
-                outcome = foretell(sides, z) if foretells and nth > 1 else OPEN
+                outcome = predict_outcome(sides, z) if foretells and nth > 1 else OPEN
                 if outcome != OPEN and sides.followed[outcome] > 0.0:
                     share[n], times[n] = 0.0, inf
                     sides.skipped[outcome] += weights[n]

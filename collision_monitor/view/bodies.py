@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.shapes.pose import multiply, rotation_matrix
-from collision_monitor.view.forms import PLANE, Form, Piece, pieces_of
+from collision_monitor.view.instanced_forms import PLANE, Form, Piece, pieces_of
 
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from collision_monitor.records import Phase, PredictionStatus
 from collision_monitor.shapes.pose import rotation_matrix
 from collision_monitor.view.bodies import DescribedBodies, Floats, Indices
-from collision_monitor.view.forms import PLANE, Form
+from collision_monitor.view.instanced_forms import PLANE, Form
 from collision_monitor.view.labels import Label, labels
 from collision_monitor.view.levels import COLORS, Level, object_levels, prediction_levels
 from collision_monitor.view.moment import Moment

@@ -26,7 +26,7 @@ from collision_monitor.session.reader import Recorded, Session
 from collision_monitor.settings.profile import Profile
 from collision_monitor.view.levels import Pair
 from collision_monitor.view.moment import Moment
-from collision_monitor.view.scene import TopicContent
+from collision_monitor.view.topic_content import TopicContent
 
 APART: Final = 64
 """Steps between two kept scenes. A moment needs at most so many steps from the kept scene before it."""

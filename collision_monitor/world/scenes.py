@@ -37,7 +37,7 @@ def _particles(objects: int | None, seed: int, rate: float | None, _path: Path |
 
 
 def _hard_spheres(objects: int | None, seed: int, rate: float | None, _path: Path | None) -> Scene:
-    from collision_monitor.world.hard_spheres.scene import HardSpheresScene  # here for the same reason
+    from collision_monitor.world.hard_spheres.hard_spheres_scene import HardSpheresScene  # here for the same reason
 
     return HardSpheresScene(objects, seed, rate)
 

@@ -11,9 +11,9 @@ import collision_monitor as cm
 from collision_monitor.alerts.answered import answered
 from collision_monitor.alerts.closest_approach import closest_approaches, sphere_approach
 from collision_monitor.alerts.evaluation import evaluate_rule
+from collision_monitor.alerts.monitored_bodies import MonitoredBodies
 from collision_monitor.alerts.protective_separation import ProtectiveSeparation
 from collision_monitor.alerts.rules import Rules
-from collision_monitor.alerts.scene import MonitoredBodies
 from collision_monitor.alerts.selection import Classes
 from collision_monitor.alerts.traffic import post_encroachment_time, required_deceleration, time_headway
 from collision_monitor.shapes.pose import Motion

@@ -7,8 +7,8 @@ import numpy as np
 import collision_monitor as cm
 from collision_monitor.monitor.uncertain_predictions import sigmas_for
 from collision_monitor.settings.profile import Profile
-from collision_monitor.uncertainty.likely_impacts import likely_impacts
 from collision_monitor.uncertainty.plane_memory import make_plane_memory
+from collision_monitor.uncertainty.plane_probability import plane_probabilities
 from collision_monitor.uncertainty.samples.error_samples import make_workspace
 from collision_monitor.uncertainty.samples.normal_samples import normal_samples, sample_columns
 from collision_monitor.uncertainty.uncertainty import Sampling
@@ -36,7 +36,7 @@ def test_the_order_of_the_pairs_changes_no_answer() -> None:
             found = np.empty((len(pairs), 4))
             work, memory = make_workspace(), make_plane_memory(SAMPLES)
             some = np.ascontiguousarray(pairs[order])
-            likely_impacts(roster.multibody, spread, some, 0.0, sampling, columns, memory, work, found)
+            plane_probabilities(roster.multibody, spread, some, 0.0, sampling, columns, memory, work, found)
             answers.append(found[np.argsort(order)])
         assert (answers[0][:, 3] > 0.01).sum() > 5
         np.testing.assert_array_equal(*answers)

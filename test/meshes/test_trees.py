@@ -14,10 +14,10 @@ from collision_monitor.geometry.polyhedra import edge_face, locate_in_polyhedron
 from collision_monitor.meshes.distance.nearest import MEMORY, PAIRS, PLACE_A, PLACE_B, answer_row, tree_distance
 from collision_monitor.meshes.extent import extents
 from collision_monitor.meshes.layout import AXES, CENTER, CHILD, FACE, HALF, WIDTH
-from collision_monitor.meshes.overlap.touching import trees_touch
+from collision_monitor.meshes.overlap.touching_triangles import trees_touch
 from collision_monitor.meshes.trees import tree
-from collision_monitor.meshes.trees.surface import surface_of
 from collision_monitor.meshes.trees.tree import tree_of
+from collision_monitor.meshes.trees.tree_surface import surface_of
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.shapes.shape_table import take, triangle_table
 

@@ -14,7 +14,7 @@ import collision_monitor as cm
 from collision_monitor._jit.settled import SettledFunction
 from collision_monitor.query.contact.contact_rows import contact_row
 from collision_monitor.query.contact.mesh_pairs import packed_trees_overlap, roots_apart, trees_contact
-from collision_monitor.query.impact.mesh_impact import _impact_in_hulls, _mesh_impact
+from collision_monitor.query.impact.mesh_pair_impact import _impact_in_hulls, _mesh_impact
 
 TORUS = trimesh.creation.torus(1.0, 0.4, major_sections=12, minor_sections=8)
 SOUP = np.random.default_rng(1).normal(size=(60, 3))

@@ -16,7 +16,7 @@ from collision_monitor.shapes.shapes import Sphere
 from collision_monitor.view.levels import COLORS, Level
 from collision_monitor.view.picture import Role, draw
 from collision_monitor.view.recording import Recording
-from collision_monitor.view.scene import TopicContent
+from collision_monitor.view.topic_content import TopicContent
 
 OBJECTS = [ObjectDescription(1, Sphere(0.5), name="cart 1"), ObjectDescription(2, Sphere(0.3), name="person 2")]
 ALWAYS = ", quiet_at_rest: false, quiet_when_parting: false"

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from collision_monitor.view.labels import Label, _joined, labels
 from collision_monitor.view.levels import Level
 from collision_monitor.view.pair_list import PairRow
-from collision_monitor.view.scene import TopicContent
+from collision_monitor.view.topic_content import TopicContent
 
 
 def row(a: int, b: int, when: str, *place: float) -> PairRow:

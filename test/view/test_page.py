@@ -25,8 +25,8 @@ from collision_monitor.shapes.shapes import ConvexHull, Points
 from collision_monitor.view.page import MOST_HIDDEN, Page
 from collision_monitor.view.panel import WIDTH, look_at
 from collision_monitor.view.picture import draw
-from collision_monitor.view.scene import TopicContent
 from collision_monitor.view.server import LOOPBACK, start_server, stop_server
+from collision_monitor.view.topic_content import TopicContent
 
 needs_browser = pytest.mark.skipif(CHROMIUM is None, reason="no Chromium: apt-get install chromium")
 

@@ -29,11 +29,11 @@ from collision_monitor.shapes.shapes import (
     Sphere,
 )
 from collision_monitor.view.bodies import MOST_FORMS, DescribedBodies, described_pieces
-from collision_monitor.view.forms import pieces_of
+from collision_monitor.view.instanced_forms import pieces_of
 from collision_monitor.view.levels import COLORS, Level, object_levels
 from collision_monitor.view.paths import SAMPLES, SIGMAS, tubes
 from collision_monitor.view.picture import Role, draw
-from collision_monitor.view.scene import TopicContent
+from collision_monitor.view.topic_content import TopicContent
 from collision_monitor.world.scene import state_array
 
 CORNERS = [(x, y, z) for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)]

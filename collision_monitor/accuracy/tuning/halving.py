@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from collision_monitor.accuracy.playback import play_steps
 from collision_monitor.accuracy.tradeoff.measurement import Measurement
 from collision_monitor.accuracy.tuning.candidates import Space, with_threads
+from collision_monitor.accuracy.tuning.parallel_measurement import Workers
 from collision_monitor.accuracy.tuning.tally import Tally
-from collision_monitor.accuracy.tuning.tiles import Workers
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.settings.profile import NO_BUDGET, Profile
 

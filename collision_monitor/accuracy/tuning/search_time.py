@@ -14,7 +14,7 @@ from collision_monitor.accuracy.playback import play_steps
 from collision_monitor.accuracy.tradeoff.profile_tradeoff import exact_answers
 from collision_monitor.accuracy.tuning.candidates import FACTORS, Space
 from collision_monitor.accuracy.tuning.halving import FINALISTS, HOPS, ROUNDS, rungs_of
-from collision_monitor.accuracy.tuning.tiles import tiles_of
+from collision_monitor.accuracy.tuning.parallel_measurement import tiles_of
 from collision_monitor.monitor.monitor import Monitor
 
 RUN_SECONDS: Final = 0.4

@@ -13,8 +13,8 @@ from collision_monitor.accuracy.inputs import Workload
 from collision_monitor.accuracy.tuning.candidates import Space, models_of
 from collision_monitor.accuracy.tuning.demands import Demands
 from collision_monitor.accuracy.tuning.halving import Halving, Trial
+from collision_monitor.accuracy.tuning.parallel_measurement import TuningInputs, workers
 from collision_monitor.accuracy.tuning.search_time import RUN_SECONDS, runs_of
-from collision_monitor.accuracy.tuning.tiles import TuningInputs, workers
 from collision_monitor.settings.parameter_file import PARAMETER_SECTION
 from collision_monitor.settings.profile import Profile
 

@@ -9,7 +9,7 @@ from collision_monitor.cli.options.quantities import whole
 from collision_monitor.cli.options.usage import UsageError
 
 if TYPE_CHECKING:
-    from collision_monitor.session.many import Engine
+    from collision_monitor.session.many_sessions import Engine
 
 
 RAY: Final = "ray"
@@ -32,7 +32,7 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
 
 def engine_of(args: argparse.Namespace) -> Engine:
     """Return the engine that the options select. Raises UsageError for an address without Ray."""
-    from collision_monitor.session.many import Engine
+    from collision_monitor.session.many_sessions import Engine
 
     if args.address is not None and args.engine != RAY:
         raise UsageError(f"--address: expected --engine {RAY}, whose cluster it names, got --engine {args.engine}")

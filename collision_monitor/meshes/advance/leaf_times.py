@@ -17,8 +17,8 @@ from collision_monitor._jit import device
 from collision_monitor._jit.lanes import Lanes, load_lanes, store
 from collision_monitor.meshes.advance.approach import Approach, time_until
 from collision_monitor.meshes.advance.box_times import curvature_until, times_open
-from collision_monitor.meshes.below import is_all_above_zero
 from collision_monitor.meshes.boxes import Block, inner
+from collision_monitor.meshes.boxes_below import is_all_above_zero
 from collision_monitor.meshes.distance.leaf_bounds import least_of_pairs
 from collision_monitor.meshes.distance.nearest import toward, triangle_at
 from collision_monitor.meshes.distance.triangle_pair import closest_triangle_points
@@ -82,7 +82,9 @@ def _raise_times(typing_context, numbers, enough, work, other, times):
         fields = [Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[0])]
         gap, speed, bent, largest, change, bend, jerk, until = fields
         enough, array = Lanes.constant(builder, arguments[1]), (signature.args[2], arguments[2])
-        far, forth, curving, reach = (load_lanes(context, builder, *array, arguments[3], WIDTH * k) for k in range(FACTS))
+        far, forth, curving, reach = (
+            load_lanes(context, builder, *array, arguments[3], WIDTH * k) for k in range(FACTS)
+        )
         curvature = curvature_until(until, largest + bend * reach, bent + curving, change + jerk * reach)
         gap, speed, known = gap - far, speed + forth, load_lanes(context, builder, *array, arguments[4])
         rest = gap - enough * (speed + enough * curvature * Lanes.constant(builder, 0.5))

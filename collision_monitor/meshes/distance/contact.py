@@ -12,7 +12,7 @@ from collision_monitor._jit import inlined, kernel, outlined
 from collision_monitor.meshes.distance.nearest import LEAST, MOST_PAIRS, ON_A, ON_B, PLACE_A, nearest_triangles
 from collision_monitor.meshes.layout import AXES, CENTER, HALF, RADIUS, REACH, WIDTH
 from collision_monitor.meshes.overlap.inside import INSIDE, UNKNOWN, is_either_in
-from collision_monitor.meshes.overlap.touching import deepest_touching, touching_triangles
+from collision_monitor.meshes.overlap.touching_triangles import deepest_touching, touching_triangles
 from collision_monitor.meshes.placing import relative
 from collision_monitor.narrow_phase.contact_row import write
 from collision_monitor.narrow_phase.pair_pose import PairPose

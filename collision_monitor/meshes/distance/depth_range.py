@@ -23,7 +23,7 @@ from collision_monitor.meshes.distance.nearest import (
 )
 from collision_monitor.meshes.layout import CHILD, RADIUS, WIDTH
 from collision_monitor.meshes.overlap.leaf_planes import may_cross
-from collision_monitor.meshes.overlap.touching import OPEN, contact_of_places, meet, repeats
+from collision_monitor.meshes.overlap.touching_triangles import OPEN, contact_of_places, meet, repeats
 from collision_monitor.meshes.placing import Placing, inverse, place_triangle
 
 MOST_LEAVES: Final = 2_000

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor.meshes.below import boxes_below, count_of, first_of
 from collision_monitor.meshes.boxes import raise_by_gaps, triangle_bounds
+from collision_monitor.meshes.boxes_below import boxes_below, count_of, first_of
 from collision_monitor.meshes.distance.leaf_bounds import farthest_along, least_of_pairs, raise_bounds
 from collision_monitor.meshes.distance.triangle_pair import Corners, closest_triangle_points
 from collision_monitor.meshes.layout import CENTER, CHILD, CORNERS, FACE, HALF, RADIUS, WIDTH

@@ -20,7 +20,7 @@ from collision_monitor.meshes.distance.nearest import NEAR_A, triangle_at
 from collision_monitor.meshes.distance.point_solid import point_distance
 from collision_monitor.meshes.distance.triangle_pair import Corners
 from collision_monitor.meshes.layout import CENTER, CHILD, FACE, RADIUS, WIDTH
-from collision_monitor.meshes.overlap.touching import repeats
+from collision_monitor.meshes.overlap.touching_triangles import repeats
 from collision_monitor.meshes.placing import Placing, inverse, place_point, relative, turn_back, turned_back
 from collision_monitor.narrow_phase.contact_row import (
     BOUND,
@@ -273,7 +273,8 @@ def box_time(blocks: Any, block: int, k: int, solid: MovingSolid) -> float:
     """Time until which a box of the tree stays apart from the solid."""
     c, e = center_of(blocks, block, k), half_of(blocks, block, k)
     bound, n = _distance_along(solid, c)
-    gap, turn = bound - box_reach_along(blocks, block, k, n), box_reach_along(blocks, block, k, cross(n, solid.move.w_a))
+    gap = bound - box_reach_along(blocks, block, k, n)
+    turn = box_reach_along(blocks, block, k, cross(n, solid.move.w_a))
     X, move = solid.X, solid.move
     return solid_time(solid.table, solid.b, X, n, gap - move.start, c, sqrt(dot(e, e)), turn, move)
 

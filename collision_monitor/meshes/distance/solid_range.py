@@ -20,7 +20,7 @@ from collision_monitor.meshes.distance.solid import (
     triangle_solid_contact,
 )
 from collision_monitor.meshes.layout import CHILD, RADIUS, WIDTH
-from collision_monitor.meshes.overlap.touching import repeats
+from collision_monitor.meshes.overlap.touching_triangles import repeats
 from collision_monitor.meshes.placing import inverse, place_point, relative
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, write
 from collision_monitor.narrow_phase.pair_pose import PairPose

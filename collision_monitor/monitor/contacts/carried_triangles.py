@@ -31,7 +31,7 @@ from collision_monitor.meshes.distance.depth_range import depth_range
 from collision_monitor.meshes.distance.nearest import PAIRS, PLACE_A, PLACE_B
 from collision_monitor.meshes.layout import CENTER, WIDTH
 from collision_monitor.meshes.overlap.inside import OUTSIDE
-from collision_monitor.meshes.overlap.touching import touching_triangles
+from collision_monitor.meshes.overlap.touching_triangles import touching_triangles
 from collision_monitor.meshes.placing import relative, turned_back
 from collision_monitor.motion.bodies import place_shape
 from collision_monitor.motion.motion import rotation_now

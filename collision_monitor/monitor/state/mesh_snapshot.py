@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from collision_monitor.errors import InputError
 from collision_monitor.meshes.trees.cloud_tree import cloud_tree, tree_points
 from collision_monitor.meshes.trees.slot_trees import plant_trees
-from collision_monitor.meshes.trees.surface import TreeSurface, surface_of
+from collision_monitor.meshes.trees.tree_surface import TreeSurface, surface_of
 from collision_monitor.monitor.state.snapshot import Snapshot, check_range
 from collision_monitor.shapes.shape_table import MESH, POINTS, TREE, ShapeTable, ShapeTableBuilder
 from collision_monitor.shapes.shapes import MOST_CLOUD_POINTS

@@ -17,7 +17,8 @@ from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, 
 from collision_monitor.narrow_phase.manifold import manifold_batch, outline
 from collision_monitor.query.arguments import Compound
 from collision_monitor.query.contact.convex_pairs import packed_contact
-from collision_monitor.query.contact.deepest import (
+from collision_monitor.query.contact.mesh_pairs import mesh_contact
+from collision_monitor.query.contact.nearest_or_deepest import (
     by_clouds,
     by_pieces,
     by_trees,
@@ -25,7 +26,6 @@ from collision_monitor.query.contact.deepest import (
     nearest_pieces,
     turn_inward,
 )
-from collision_monitor.query.contact.mesh_pairs import mesh_contact
 from collision_monitor.query.contact.nearest_pieces import NearestPieces
 from collision_monitor.query.contact.open_gap import distance_of_fillings
 from collision_monitor.query.contact.parting import parting_translation

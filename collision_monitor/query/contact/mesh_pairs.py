@@ -15,7 +15,7 @@ from collision_monitor.meshes.boxes import box_separations
 from collision_monitor.meshes.distance.contact import APART, tree_contact
 from collision_monitor.meshes.distance.nearest import ANSWER, BOUNDS, MEMORY, PLACE_A, PLACE_B
 from collision_monitor.meshes.overlap.inside import OUTSIDE, is_either_in
-from collision_monitor.meshes.overlap.touching import touching_triangles
+from collision_monitor.meshes.overlap.touching_triangles import touching_triangles
 from collision_monitor.meshes.placing import relative
 from collision_monitor.meshes.trees.shape_trees import CERTAIN, NEVER, KeptTree, have_kernels, kept_tree
 from collision_monitor.motion.motion import quaternion_to_matrix

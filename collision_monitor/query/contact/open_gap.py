@@ -11,8 +11,14 @@ from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.meshes.distance.contact import OPEN
 from collision_monitor.meshes.trees.shape_trees import trees_of_pair
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE
-from collision_monitor.query.contact.deepest import by_clouds, by_pieces, by_trees, contact_by_trees, locate_in_meshes
 from collision_monitor.query.contact.fillings import fillings
+from collision_monitor.query.contact.nearest_or_deepest import (
+    by_clouds,
+    by_pieces,
+    by_trees,
+    contact_by_trees,
+    locate_in_meshes,
+)
 from collision_monitor.query.posed import Posed, pose_in_world
 from collision_monitor.records import Model
 from collision_monitor.shapes.pose import Pose

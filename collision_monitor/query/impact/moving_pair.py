@@ -196,7 +196,7 @@ def first_impacts(
     return events[:found]
 
 
-def deep_by(multibody: Multibody, query: MotionQuery, round_off: float) -> float:
+def deep_overlap_time(multibody: Multibody, query: MotionQuery, round_off: float) -> float:
     """Time (s) at which a point is certainly in two solids, both deeper than `round_off` (m), or infinity.
 
     Only for meshes; it finds overlaps where no triangles cross because they lie in one plane.

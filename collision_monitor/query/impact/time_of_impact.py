@@ -17,17 +17,17 @@ from collision_monitor.query.arguments import Compound, finite_number, whole_num
 from collision_monitor.query.contact.contact import Contact, contact
 from collision_monitor.query.contact.fillings import fillings
 from collision_monitor.query.contact.open_gap import least_gap
+from collision_monitor.query.impact.initial_contact_impact import follow
 from collision_monitor.query.impact.moving_pair import (
     MotionQuery,
     MovingShape,
-    deep_by,
+    deep_overlap_time,
     first_impacts,
     in_convex_pieces,
     lay_out_pair,
     make_moving_shape,
 )
-from collision_monitor.query.impact.quick_impact import quick_impact, quick_open_impact
-from collision_monitor.query.impact.touching import follow
+from collision_monitor.query.impact.single_kernel_impact import quick_open_impact, single_kernel_impact
 from collision_monitor.records import Method
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
 from collision_monitor.shapes.pose import Motion
@@ -116,7 +116,7 @@ def time_of_impact(
         return impact_by_method(shape_a, motion_a, shape_b, motion_b, query, method, duration)
     arguments = shape_a, motion_a, shape_b, motion_b
     is_open = _is_open(shape_a) or _is_open(shape_b)
-    quick = (quick_open_impact if is_open else quick_impact)(*arguments, query)
+    quick = (quick_open_impact if is_open else single_kernel_impact)(*arguments, query)
     if quick is not None:
         return impact_of_times(quick, arguments)
     a, b = make_moving_shape(shape_a, motion_a, "A"), make_moving_shape(shape_b, motion_b, "B")
@@ -171,7 +171,7 @@ def _first_impact(a: MovingShape, b: MovingShape, query: MotionQuery, uncertain:
         return Impact("hit", 0.0, 0.0, start)
     arguments = a.shapes, a.motion, b.shapes, b.motion
     if _may_overlap(a, b, start, query.separation, round_off):
-        upper = deep_by(multibody, query, round_off)
+        upper = deep_overlap_time(multibody, query, round_off)
         if upper <= 0.0:
             return Impact("hit", 0.0, 0.0, start)
         return _impact(0.0, upper, Method.CONSERVATIVE_ADVANCEMENT, arguments)
@@ -186,7 +186,7 @@ def _first_impact(a: MovingShape, b: MovingShape, query: MotionQuery, uncertain:
             lower, upper = follow(in_convex_pieces(a, b, near), in_convex_pieces(b, a, near), query, round_off)
         except TooCostlyError:
             lower, upper = 0.0, math.inf
-        sure = deep_by(multibody, query, round_off)
+        sure = deep_overlap_time(multibody, query, round_off)
         if sure < lower:  # triangles that start in one plane go through each other, and do not meet again
             lower = 0.0
         upper = min(upper, sure)

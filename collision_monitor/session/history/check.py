@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 from collision_monitor.alerts.rules import Rules
 from collision_monitor.session.history.expectations import ExpectationResult, evaluate_expectations, parse_expectations
 from collision_monitor.session.history.read_history import read_history
-from collision_monitor.session.many import ALL_CORES, Engine, for_each
+from collision_monitor.session.many_sessions import ALL_CORES, Engine, for_each
 from collision_monitor.session.reader import Session
 from collision_monitor.session.replaying.replay import replay
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple, Protocol
 
-from collision_monitor.sources.ground.scene import SourceScene
+from collision_monitor.sources.ground.source_scene import SourceScene
 
 
 class RawMessage(NamedTuple):

@@ -7,7 +7,7 @@ from collections.abc import Hashable, Iterable
 from dataclasses import dataclass
 from typing import Any, Final
 
-from collision_monitor.sources.ground.scene import SourceScene
+from collision_monitor.sources.ground.source_scene import SourceScene
 
 REMEMBERED: Final = 10_000
 """Vanished tracks whose ids are kept for their return."""

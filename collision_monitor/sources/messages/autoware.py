@@ -21,8 +21,8 @@ from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.prisms import prism
-from collision_monitor.sources.ground.scene import SourceScene
 from collision_monitor.sources.ground.scene_states import carry_states, empty_states, turn_twists, turned_triangles
+from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.ground.track_shapes import Measured, held_by, rounded_up, still_held
 from collision_monitor.sources.ground.tracks import DescribedTrack, TrackTable
 from collision_monitor.sources.messages.autoware_bytes import POLYGON, TrackArrays

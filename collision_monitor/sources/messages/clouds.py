@@ -19,7 +19,7 @@ from collision_monitor.shapes.shapes import MOST_CLOUD_POINTS, Points
 from collision_monitor.sources.ground.frames import frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
-from collision_monitor.sources.ground.scene import SourceScene
+from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.ground.yaml_table import known
 
 SCAN: Final = "sensor_msgs/msg/LaserScan"

@@ -20,8 +20,8 @@ from collision_monitor.sources.ground.covariances import usable_blocks
 from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
-from collision_monitor.sources.ground.scene import SourceScene
 from collision_monitor.sources.ground.scene_states import carry_states, empty_states
+from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.ground.track_shapes import held_by, rounded_up
 from collision_monitor.sources.ground.tracks import DescribedTrack, TrackTable
 from collision_monitor.sources.messages.poses import worst_stddev

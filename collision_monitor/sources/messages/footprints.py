@@ -20,8 +20,8 @@ from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.prisms import prism
-from collision_monitor.sources.ground.scene import SourceScene
 from collision_monitor.sources.ground.scene_states import carry_states, empty_states
+from collision_monitor.sources.ground.source_scene import SourceScene
 
 FOOTPRINT: Final = "geometry_msgs/msg/PolygonStamped"
 

@@ -13,7 +13,6 @@ from collision_monitor.sources.ground.covariances import Blocks, usable_blocks, 
 from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
-from collision_monitor.sources.ground.scene import SourceScene
 from collision_monitor.sources.ground.scene_states import (
     carry_states,
     empty_states,
@@ -21,6 +20,7 @@ from collision_monitor.sources.ground.scene_states import (
     turn_twists,
     turned_triangles,
 )
+from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.ground.yaml_table import SHAPES
 
 ODOMETRY: Final = "nav_msgs/msg/Odometry"

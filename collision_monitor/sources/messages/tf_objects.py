@@ -9,8 +9,8 @@ from collision_monitor.records import StateFlag
 from collision_monitor.sources.ground.frames import frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
-from collision_monitor.sources.ground.scene import SourceScene
 from collision_monitor.sources.ground.scene_states import empty_states
+from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.messages.poses import require_shape
 
 TRANSFORMS: Final = "tf2_msgs/msg/TFMessage"

@@ -7,7 +7,7 @@ from typing import Any
 
 from collision_monitor.errors import CollisionMonitorError
 from collision_monitor.robots.srdf import ordered
-from collision_monitor.sources.ground.scene import SourceScene
+from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.robot.collision_matrix import CollisionMatrix
 from collision_monitor.sources.robot.link_rules import LinkRules
 

@@ -16,7 +16,7 @@ from collision_monitor.shapes.pose import Pose
 from collision_monitor.sources.ground.frames import FrameMotion, MissingFrame
 from collision_monitor.sources.ground.mapping import Mapping as SourcesFile
 from collision_monitor.sources.ground.object_entry import ObjectEntry
-from collision_monitor.sources.ground.scene import SourceScene
+from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.robot.carried_bodies import Body
 from collision_monitor.sources.robot.collision_objects import (
     REMOVE,

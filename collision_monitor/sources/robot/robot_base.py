@@ -12,8 +12,8 @@ from collision_monitor.robots.robot import Robot
 from collision_monitor.shapes.pose import Pose, from_rotation_vector, multiply
 from collision_monitor.sources.ground.covariances import usable_blocks
 from collision_monitor.sources.ground.frames import IDENTITY, FrameMotion, frame_name
-from collision_monitor.sources.ground.scene import SourceScene
 from collision_monitor.sources.ground.scene_states import empty_states, turn_twists
+from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.messages.poses import ODOMETRY, put_pose, worst_stddev
 from collision_monitor.sources.messages.tf_objects import TRANSFORMS, header_of
 from collision_monitor.sources.robot.robot_entry import RobotEntry

@@ -17,8 +17,8 @@ from collision_monitor.robots.robot import Description, Robot, make_robot
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.sources.ground.frames import FrameMotion
 from collision_monitor.sources.ground.mapping import Mapping
-from collision_monitor.sources.ground.scene import SourceScene
 from collision_monitor.sources.ground.solid_shapes import scaled_shape
+from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.robot.carried_bodies import Body, CarriedBodies
 from collision_monitor.sources.robot.collision_objects import pose_bytes, shape_bytes
 from collision_monitor.sources.robot.joint_table import JointTable

@@ -11,9 +11,9 @@ from collision_monitor._jit import device, inlined
 from collision_monitor.impact.body_impact import Scratch, make_scratch
 from collision_monitor.motion.motion import MOTION
 from collision_monitor.motion.trigonometry import sin_cos
-from collision_monitor.uncertainty.samples.foretold_samples import SIDES
 from collision_monitor.uncertainty.samples.known_axes import AXES
 from collision_monitor.uncertainty.samples.normal_samples import DIMENSIONS
+from collision_monitor.uncertainty.samples.skipped_samples import SIDES
 from collision_monitor.uncertainty.spread import FIFTH_ROOT, unknown_acceleration
 
 ORIENTATION, LEFT_OVER = 6, 12

@@ -22,7 +22,7 @@ from collision_monitor.accuracy.tuning import search_time
 from collision_monitor.accuracy.tuning.candidates import Space, models_of, with_threads
 from collision_monitor.accuracy.tuning.demands import Demands
 from collision_monitor.accuracy.tuning.halving import Trial, rungs_of
-from collision_monitor.accuracy.tuning.tiles import MOST_TRUTHS, TuningInputs
+from collision_monitor.accuracy.tuning.parallel_measurement import MOST_TRUTHS, TuningInputs
 from collision_monitor.accuracy.tuning.tune import explain, parameter_file, space_of, tune
 from collision_monitor.cli.main import main
 from collision_monitor.cli.options.parameter_file import check_parameter_file

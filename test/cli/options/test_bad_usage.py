@@ -13,7 +13,7 @@ import pytest
 from collision_monitor.cli.main import main, make_parser
 from collision_monitor.cli.options.parameter_file import check_parameter_file
 from collision_monitor.errors import InputError
-from collision_monitor.session import many
+from collision_monitor.session import many_sessions as many
 
 PROGRAM = Path(sys.executable).with_name("collision-monitor")
 GOLDEN = Path(__file__).parents[2] / "golden" / "balanced.mcap"

@@ -15,7 +15,8 @@ from collision_monitor.meshes.distance.nearest import LEAST, MEMORY, answer_row,
 from collision_monitor.meshes.distance.solid import MOST_EXAMINED
 from collision_monitor.meshes.trees.shape_trees import kept_tree
 from collision_monitor.query.contact.contact import deepest
-from collision_monitor.query.impact import moving_pair, touching
+from collision_monitor.query.impact import initial_contact_impact as touching
+from collision_monitor.query.impact import moving_pair
 from collision_monitor.query.posed import Posed
 
 RNG = np.random.default_rng(3)

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 import collision_monitor as cm
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE
-from collision_monitor.query.contact.deepest import by_pieces, by_trees
+from collision_monitor.query.contact.nearest_or_deepest import by_pieces, by_trees
 from collision_monitor.query.posed import Posed
 
 _TORUS = trimesh.creation.torus(1.0, 0.3, major_sections=12, minor_sections=6)

@@ -12,7 +12,7 @@ from processor_time import within
 import collision_monitor as cm
 from collision_monitor import Motion, Pose
 from collision_monitor.query.impact.moving_pair import make_moving_shape
-from collision_monitor.query.impact.quick_impact import quick_impact, quick_open_impact
+from collision_monitor.query.impact.single_kernel_impact import quick_open_impact, single_kernel_impact
 from collision_monitor.query.impact.time_of_impact import _first_possible_impact, check_query
 
 CUBE = trimesh.creation.box((2, 2, 2))
@@ -190,7 +190,7 @@ def test_the_impact_of_what_open_meshes_may_be_is_the_same_with_and_without_the_
             slow = _first_possible_impact(
                 make_moving_shape(A, motions[0], "A"), make_moving_shape(B, motions[1], "B"), query
             )
-            surfaces = quick_impact(A, motions[0], B, motions[1], query)
+            surfaces = single_kernel_impact(A, motions[0], B, motions[1], query)
             # the surfaces count besides; steps of advancement end within the tolerance
             assert quick[0] == pytest.approx(min(slow, surfaces[0]), abs=1e-5), k
             assert quick[1] == pytest.approx(surfaces[1], abs=1e-5), k
@@ -209,7 +209,7 @@ def test_open_meshes_that_part_or_pass_each_other_are_clear_as_their_surfaces_ar
             Motion(Pose(), angular=rng.normal(size=3)),
             Motion(Pose(aside), rng.choice([1.0, -0.1]) * aside, rng.normal(size=3)),
         )
-        surfaces = quick_impact(A, motions[0], B, motions[1], query)
+        surfaces = single_kernel_impact(A, motions[0], B, motions[1], query)
         assert quick_open_impact(A, motions[0], B, motions[1], query) == surfaces == (np.inf, np.inf)
         assert cm.time_of_impact(A, motions[0], B, motions[1]).status == "clear"
 

@@ -31,7 +31,7 @@ from collision_monitor.session.history.expectations import (
 )
 from collision_monitor.session.history.history import History
 from collision_monitor.session.history.read_history import read_history
-from collision_monitor.session.many import Engine, find_sessions
+from collision_monitor.session.many_sessions import Engine, find_sessions
 
 PROGRAM = Path(sys.executable).with_name("collision-monitor")
 SHAPES, STATES, CONTACTS, PREDICTIONS, STATUS = TYPES

@@ -3,7 +3,7 @@
 import sys
 from pathlib import Path
 
-from collision_monitor.world.hard_spheres.scene import HardSpheresScene
+from collision_monitor.world.hard_spheres.hard_spheres_scene import HardSpheresScene
 
 sys.path.insert(0, str(Path(__file__).parents[3] / "benchmarks"))
 from confirmed_predictions import HORIZON, by_object_id, compare, in_process

@@ -12,7 +12,7 @@ from collision_monitor.query.contact.convex_pairs import convex_impact, packed_c
 from collision_monitor.query.contact.fillings import filled_box, filled_mesh
 from collision_monitor.query.contact.mesh_pairs import boxes_apart
 from collision_monitor.query.contact.open_gap import may_be_inside
-from collision_monitor.query.impact.mesh_impact import first_mesh_impact, impact_in_hulls, mesh_impact_of_faces
+from collision_monitor.query.impact.mesh_pair_impact import first_mesh_impact, impact_in_hulls, mesh_impact_of_faces
 from collision_monitor.query.impact.moving_pair import MotionQuery
 from collision_monitor.shapes.pose import Motion, Pose
 from collision_monitor.shapes.shapes import Mesh, Shape
@@ -24,7 +24,7 @@ ALL: Final = 1 << 53
 """More faces than a shape has."""
 
 
-def quick_impact(
+def single_kernel_impact(
     shape_a: Compound, motion_a: Motion, shape_b: Compound, motion_b: Motion, query: MotionQuery
 ) -> tuple[float, float] | None:
     """Lower and upper end (s) for two convex solids, or a mesh and a shape with a tree; None for others.
@@ -94,7 +94,7 @@ def _possible_impact(
     for a, b in product(parts_a, parts_b):
         if a is shape_a and b is shape_b:
             continue
-        times = quick_impact(a, motion_a, b, motion_b, query)
+        times = single_kernel_impact(a, motion_a, b, motion_b, query)
         if times is None:
             return (0.0, False) if _overlap(a, motion_a, b, motion_b, query) else None
         first = min(first, times[0])

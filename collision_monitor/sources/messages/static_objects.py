@@ -8,7 +8,7 @@ from typing import Any
 from collision_monitor.shapes.pose import Pose, multiply, rotation_matrix
 from collision_monitor.sources.ground.frames import FrameMotion
 from collision_monitor.sources.ground.object_entry import ObjectEntry
-from collision_monitor.sources.ground.scene import SourceScene
+from collision_monitor.sources.ground.source_scene import SourceScene
 
 
 class StandingObjects:

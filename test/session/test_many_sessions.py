@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from collision_monitor.errors import InputError, SessionError, UnsupportedError
-from collision_monitor.session.many import ENDED, Engine, find_sessions, for_each
+from collision_monitor.session.many_sessions import ENDED, Engine, find_sessions, for_each
 
 
 def work(path: Path) -> str:

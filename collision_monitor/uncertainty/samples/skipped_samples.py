@@ -117,7 +117,7 @@ def set_limits(points, times, first, middle, sides):
 
 
 @inlined
-def foretell(sides, z):
+def predict_outcome(sides, z):
     """Outcome of the sample with errors z (DIMENSIONS,): MISSES, OPEN or MEETS."""
     low, high = _widened(sides.widening[0], z), _widened(sides.widening[1], z)
     if low > sides.above[0] or high > sides.above[1]:
@@ -131,7 +131,7 @@ def weigh_followed(points, weights, first, sides):
     for outcome in range(2):
         sides.followed[outcome] = sides.skipped[outcome] = 0.0
     for n in range(first):
-        outcome = foretell(sides, points[n])
+        outcome = predict_outcome(sides, points[n])
         if outcome != OPEN:
             sides.followed[outcome] += weights[n]
 
@@ -140,6 +140,6 @@ def weigh_followed(points, weights, first, sides):
 def stand_for_skipped(points, share, first, sides):
     """Add the weights of the samples that were skipped to the share (S,) of those that stand for them."""
     for n in range(first):
-        outcome = foretell(sides, points[n])
+        outcome = predict_outcome(sides, points[n])
         if outcome != OPEN:
             share[n] *= 1.0 + sides.skipped[outcome] / sides.followed[outcome]

@@ -185,9 +185,7 @@ def triangle_pair_depth(S: Corners, T: Corners, radius: float) -> tuple[float, V
 
 
 @device
-def contact_of_places(
-    blocks_a: Any, a: int, blocks_b: Any, b: int, X: Any
-) -> tuple[float, Vector, Vector]:
+def contact_of_places(blocks_a: Any, a: int, blocks_b: Any, b: int, X: Any) -> tuple[float, Vector, Vector]:
     """`triangle_contact` of the triangles at two places, WIDTH * block + member; the point is on A's surface."""
     S = triangle_at(blocks_a, a // WIDTH, a % WIDTH)
     T = place_triangle(X, triangle_at(blocks_b, b // WIDTH, b % WIDTH))

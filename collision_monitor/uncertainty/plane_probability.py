@@ -59,7 +59,7 @@ def _approach(A, B, horizon):
 
 
 @kernel
-def likely_impacts(multibody, spread, pairs, now, sampling, columns, memory, work, answers):
+def plane_probabilities(multibody, spread, pairs, now, sampling, columns, memory, work, answers):
     """Write times (s after `now`) and probabilities of impact of pairs (P, 2) of body slots into answers (P, 4).
 
     An answer is NaN if neither body has declared an uncertainty, or if the pair is stated to pass and its probability

@@ -46,8 +46,13 @@ def first_mesh_impact(
 
 
 def mesh_impact_of_faces(
-    shape_a: Shape, motion_a: Motion, shape_b: Shape, motion_b: Motion, query: tuple[float, float, float, int],
-    faces: tuple[int, int], begin: float = 0.0,
+    shape_a: Shape,
+    motion_a: Motion,
+    shape_b: Shape,
+    motion_b: Motion,
+    query: tuple[float, float, float, int],
+    faces: tuple[int, int],
+    begin: float = 0.0,
 ) -> tuple[float, float, bool] | None:
     """`mesh_impact`, and whether faces certainly meet that are among the first so many of each shape."""
     if not have_kernels(kept_tree(shape_a), kept_tree(shape_b), NEVER):
@@ -63,7 +68,12 @@ def mesh_impact_of_faces(
 
 
 def impact_in_hulls(
-    hull_a: Shape, shape_a: Shape, motion_a: Motion, hull_b: Shape, shape_b: Shape, motion_b: Motion,
+    hull_a: Shape,
+    shape_a: Shape,
+    motion_a: Motion,
+    hull_b: Shape,
+    shape_b: Shape,
+    motion_b: Motion,
     query: tuple[float, float, float, int],
 ) -> tuple[float, float] | None:
     """First impact of two moving shapes in convex solids that move with them: lower of the solids, upper of the shapes.
@@ -104,9 +114,7 @@ def _times(event, horizon):
 
 @settled
 @kernel
-def _mesh_impact(
-    table, state_a, state_b, horizon, tolerance, separation, iterations, faces_a, faces_b, begin, own
-):
+def _mesh_impact(table, state_a, state_b, horizon, tolerance, separation, iterations, faces_a, faces_b, begin, own):
     """First impact: lower and upper (s), infinite for none; lower is 0 for shapes that touch at the start.
 
     And whether the triangles that meet are among the first faces_a and faces_b. states (1, 16): packed motions. begin:
@@ -141,9 +149,7 @@ def _first_time(table, parts, bodies, window, search, scratch):
 
 @settled
 @kernel
-def _impact_in_hulls(
-    hull_a, hull_b, table, state_a, state_b, horizon, tolerance, separation, iterations, own, memory
-):
+def _impact_in_hulls(hull_a, hull_b, table, state_a, state_b, horizon, tolerance, separation, iterations, own, memory):
     """First time at which packed convex solids meet, and `_mesh_impact` from then on; all 0 for solids that touch.
 
     memory: of `pair_memory`.

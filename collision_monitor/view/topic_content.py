@@ -37,7 +37,7 @@ from collision_monitor.shapes.pose import multiply
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 from collision_monitor.uncertainty.spread import worst_stddevs
 from collision_monitor.view.bodies import DescribedBodies, described_pieces
-from collision_monitor.view.forms import Piece
+from collision_monitor.view.instanced_forms import Piece
 from collision_monitor.view.levels import Level, Pair
 from collision_monitor.view.moment import Moment
 

@@ -79,9 +79,7 @@ def by_clouds(a: Posed, b: Posed, offset: Array) -> Deepest | None:
     return best
 
 
-def contact_by_trees(
-    trees: tuple[Array, Array], X: tuple[Array, Array], Y: tuple[Array, Array]
-) -> tuple[int, Array]:
+def contact_by_trees(trees: tuple[Array, Array], X: tuple[Array, Array], Y: tuple[Array, Array]) -> tuple[int, Array]:
     """Return what `contact_of_trees` knows of two trees with these rotations and positions, and the contact row.
 
     The rotations are copied because numba compiles a kernel once more for each combination of read-only arrays.

@@ -13,10 +13,10 @@ from collision_monitor.monitor import uncertain_predictions
 from collision_monitor.monitor.uncertain_predictions import sigmas_for
 from collision_monitor.records import STATE
 from collision_monitor.settings.profile import Profile
-from collision_monitor.uncertainty.likely_impacts import LEFT, likely_impacts
 from collision_monitor.uncertainty.pair_errors import ROUNDING
 from collision_monitor.uncertainty.plane_impacts import FACETS
 from collision_monitor.uncertainty.plane_memory import make_plane_memory
+from collision_monitor.uncertainty.plane_probability import LEFT, plane_probabilities
 from collision_monitor.uncertainty.samples.error_samples import make_workspace
 from collision_monitor.uncertainty.samples.normal_samples import normal_samples, sample_columns
 from collision_monitor.uncertainty.uncertainty import Sampling, impact_probabilities
@@ -67,7 +67,7 @@ def both_methods(monitor: cm.Monitor, stated: bool, *, swapped: bool = False) ->
     pairs, work, answers = np.array([[1, 0] if swapped else [0, 1]], np.int32), make_workspace(), np.empty((2, 1, 4))
     impact_probabilities(roster.multibody, spread, pairs, 0.0, sampling, work, answers[0])
     columns, memory = sample_columns(SAMPLES), make_plane_memory(SAMPLES)
-    likely_impacts(roster.multibody, spread, pairs, 0.0, sampling, columns, memory, work, answers[1])
+    plane_probabilities(roster.multibody, spread, pairs, 0.0, sampling, columns, memory, work, answers[1])
     return answers[0], answers[1]
 
 
