@@ -86,7 +86,7 @@ def _search(
     """Write the time and the lower bound of the smallest distance of each pair into found (2, n).
 
     velocity (n, 3): of the second body relative to the first. rate (n,): how fast the gap along a fixed direction may
-    change beyond it (m/s). window: the time now and the horizon (s). enough (n,): see `closest_approach`.
+    change beyond it (m/s). window: the time now and the horizon (s). enough (n,): see `closest_approaches`.
     """
     horizon = window[1]
     for k in range(first.size):

@@ -138,7 +138,7 @@ def _line(size, x, dx, d):
 
 @inlined
 def _between_boxes(sa, sb, A, B, gap, remaining):
-    """`advance` for cores that are boxes: the bound is the minimum of parabolas, one for each choice of their sides.
+    """`advance_along_axis` for cores that are boxes: the bound is the minimum of parabolas, one for each choice of their sides.
 
     Newton's method from outside: the roots decrease until the parabola at a root is the one that gave the root.
     """
@@ -180,7 +180,7 @@ def _gap_after(table, shapes, A, B, h, gap, d):
 
 @device
 def _between_any(table, shapes, A, B, gap, remaining):
-    """`advance` for all cores: brackets the root of the bound between times outside (bound < 0) and inside.
+    """`advance_along_axis` for all cores: brackets the root of the bound between times outside (bound < 0) and inside.
 
     The root of a chord lies inside, because the bound is concave and the chord lies below it.
     """

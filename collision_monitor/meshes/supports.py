@@ -59,7 +59,7 @@ class Supports:
         self._corners = [row(ROWS * CORNERS_OF_BOX + k) for k in range(8)]
 
     def reach(self, along: list[Lanes]) -> Lanes:
-        """`reach_along` from the centres of the boxes, along directions in their axes."""
+        """`content_reach_along` from the centres of the boxes, along directions in their axes."""
         zero = Lanes.constant(along[0].builder, 0.0)
         back, size = [zero - each for each in along], [abs(each) for each in along]
         least = size[0].least(size[1]).least(size[2])

@@ -350,7 +350,7 @@ def _mirrored(z, mirror, out):
 
 @device
 def _set_sides(multibody, i, j, t, turning, yaw_only, times, first, sampling, work, sides):
-    """Find out from the times (S,) of the first samples what foretells those of the others; see `foretell`.
+    """Find out from the times (S,) of the first samples what foretells those of the others; see `predict_outcome`.
 
     The motions are the stated ones, t the time (s) that matters most, turning the errors of orientation, and yaw_only
     whether they are about the z axis alone.

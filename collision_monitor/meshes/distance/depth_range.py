@@ -67,7 +67,7 @@ def depth_range(
     """Bounds (m) on the depth of the deepest pair of triangles of two trees that meet, at most `wanted` apart.
 
     (-1, 0) if none meet, (-1, inf) if the search ended early. X: pose of B in A's frame. answer: gets the places of the
-    triangles with the lower bound, as in `nearest`.
+    triangles with the lower bound, as in `nearest_triangles`.
     """
     Y = inverse(X)
     work[0], work[1], work[2] = -inf, WIDTH * root_a, WIDTH * root_b

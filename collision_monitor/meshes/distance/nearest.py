@@ -41,7 +41,7 @@ MEMORY: Final = PAIRS + 2 * MOST_PAIRS
 """Numbers of scratch memory of a query."""
 
 BETWEEN: Final = PAIRS
-"""Bounds on the squared distances of all pairs of triangles of two leaves (m^2), where `touching` keeps its pairs."""
+"""Bounds on the squared distances of all pairs of triangles of two leaves (m^2), where `touching_triangles` keeps its pairs."""
 
 # columns of an answer
 SQUARED: Final = 0
@@ -281,6 +281,6 @@ def nearest_triangles(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work
 
 @kernel
 def tree_distance(tree_a, R_a, p_a, tree_b, R_b, p_b, limit, answer, work):
-    """`nearest` of two trees at poses given by rotations (3, 3) and positions (3,) (m)."""
+    """`nearest_triangles` of two trees at poses given by rotations (3, 3) and positions (3,) (m)."""
     p = p_b[0] - p_a[0], p_b[1] - p_a[1], p_b[2] - p_a[2]
     return nearest_triangles(tree_a, 0, tree_b, 0, relative(R_a, R_b, p), limit, answer, work)

@@ -62,7 +62,7 @@ class SolidMemory(NamedTuple):
 
     triangle: Any  # (3, LANES): its corners, the last one repeated
     gjk: Any  # (WORK_SIZE,)
-    tree: Any  # (MEMORY,), see `nearest`
+    tree: Any  # (MEMORY,), see `nearest_triangles`
 
 
 @inlined
@@ -113,7 +113,7 @@ def _is_point(T: Corners) -> bool:
 def _point_contact(
     table: Any, b: int, pose: PairPose, x: Vector, radius: float, limit: float, out: Any, memory: SolidMemory
 ) -> bool:
-    """As `triangle_contact`, for a point of A: in closed form where there is one, otherwise by GJK and EPA."""
+    """As `triangle_solid_contact`, for a point of A: in closed form where there is one, otherwise by GJK and EPA."""
     y = place_point(inverse(relative(pose.R_A, pose.R_B, pose.p)), x)
     distance, d, is_exact = point_distance(table, b, y)
     x = rotate(pose.R_A, x)

@@ -49,7 +49,7 @@ def repeats(blocks: Any, block: int, k: int) -> bool:
 def _pairs_within(
     blocks_a: Any, root_a: int, blocks_b: Any, root_b: int, X: Any, slack: float, most: int, leaves: int, work: Any
 ) -> tuple[int, bool]:
-    """`touching` of triangles at most `slack` (m) apart, until so many pairs of leaves are examined."""
+    """`touching_triangles` of triangles at most `slack` (m) apart, until so many pairs of leaves are examined."""
     Y, near = inverse(X), max(slack, OPEN)
     work[0], work[1], work[2] = 0.0, WIDTH * root_a, WIDTH * root_b
     waiting, found = 1, 0
@@ -99,7 +99,7 @@ def touching_triangles(
 ) -> tuple[int, bool]:
     """Find pairs of triangles that meet, `most` at most; return their number, and whether these are all.
 
-    Pair k is at work[PAIRS + 2 k]: the places of both triangles. Other arguments as in `nearest`.
+    Pair k is at work[PAIRS + 2 k]: the places of both triangles. Other arguments as in `nearest_triangles`.
     """
     return _pairs_within(blocks_a, root_a, blocks_b, root_b, X, 0.0, most, MOST_LEAVES, work)
 
@@ -108,9 +108,9 @@ def touching_triangles(
 def nearly_touching(
     blocks_a: Any, root_a: int, blocks_b: Any, root_b: int, X: Any, slack: float, most: int, work: Any
 ) -> int:
-    """Number of some pairs of triangles at most `slack` (m) apart, as `touching` finds them.
+    """Number of some pairs of triangles at most `slack` (m) apart, as `touching_triangles` finds them.
 
-    Round-off may hide triangles that touch in one plane from `touching`.
+    Round-off may hide triangles that touch in one plane from `touching_triangles`.
     """
     found, _ = _pairs_within(blocks_a, root_a, blocks_b, root_b, X, slack, most, FEWER_LEAVES, work)
     return found
@@ -186,7 +186,7 @@ def triangle_pair_depth(S: Corners, T: Corners, radius: float) -> tuple[float, V
 
 @device
 def contact_of_places(blocks_a: Any, a: int, blocks_b: Any, b: int, X: Any) -> tuple[float, Vector, Vector]:
-    """`triangle_contact` of the triangles at two places, WIDTH * block + member; the point is on A's surface."""
+    """`triangle_pair_depth` of the triangles at two places, WIDTH * block + member; the point is on A's surface."""
     S = triangle_at(blocks_a, a // WIDTH, a % WIDTH)
     T = place_triangle(X, triangle_at(blocks_b, b // WIDTH, b % WIDTH))
     own = blocks_a[a // WIDTH, RADIUS, a % WIDTH]
@@ -198,9 +198,9 @@ def contact_of_places(blocks_a: Any, a: int, blocks_b: Any, b: int, X: Any) -> t
 def deepest_touching(
     blocks_a: Any, blocks_b: Any, X: Any, work: Any, count: int, answer: Any
 ) -> tuple[float, Vector, Vector]:
-    """Depth (m) of the deepest of the first pairs of `touching`, its direction, and a point on A.
+    """Depth (m) of the deepest of the first pairs of `touching_triangles`, its direction, and a point on A.
 
-    Its places are written to the answer (see `nearest`).
+    Its places are written to the answer (see `nearest_triangles`).
     """
     best, direction, point = -1.0, (0.0, 0.0, 1.0), NOWHERE
     for k in range(count):
@@ -214,6 +214,6 @@ def deepest_touching(
 
 @kernel
 def trees_touch(tree_a, R_a, p_a, tree_b, R_b, p_b, most, work):
-    """`touching` of two trees at poses given by rotations (3, 3) and positions (3,) (m)."""
+    """`touching_triangles` of two trees at poses given by rotations (3, 3) and positions (3,) (m)."""
     p = p_b[0] - p_a[0], p_b[1] - p_a[1], p_b[2] - p_a[2]
     return touching_triangles(tree_a, 0, tree_b, 0, relative(R_a, R_b, p), most, work)

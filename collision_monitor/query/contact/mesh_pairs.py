@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 _ROTATIONS: Final = MEMORY
 _ANSWER: Final = _ROTATIONS + 18
 _MEMORY: Final = _ANSWER + ANSWER
-"""Parts of the scratch memory: that of a query, both rotations (2, 3, 3) to world axes, and the answer of `nearest`."""
+"""Parts of the scratch memory: that of a query, both rotations (2, 3, 3) to world axes, and the answer of `nearest_triangles`."""
 
 _ROUNDED_UP: Final = 1.0 + 8.0 * EPSILON
 
@@ -118,7 +118,7 @@ def _place(pose_a: Any, pose_b: Any, R: Any) -> tuple[float, float, float]:
 @settled
 @kernel
 def roots_apart(tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, memory: Any) -> bool:
-    """Whether the boxes of two whole trees, placed as in `trees_overlap`, are apart."""
+    """Whether the boxes of two whole trees, placed as in `packed_trees_overlap`, are apart."""
     R = memory[_ROTATIONS:_ANSWER].reshape((2, 3, 3))
     p = _place(pose_a, pose_b, R)
     box_separations(tree_a, 0, 0, tree_b, 0, relative(R[0], R[1], p), memory, BOUNDS)
@@ -145,7 +145,7 @@ def packed_trees_overlap(tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, mem
 def trees_contact(
     tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, memory: Any, row: Any
 ) -> tuple[float, float]:
-    """`tree_contact` of two trees placed as in `trees_overlap`, with points in the world.
+    """`tree_contact` of two trees placed as in `packed_trees_overlap`, with points in the world.
 
     Return the distance and its bound (m), a bound below 0 if they are not certainly apart.
     """

@@ -54,7 +54,7 @@ def mesh_impact_of_faces(
     faces: tuple[int, int],
     begin: float = 0.0,
 ) -> tuple[float, float, bool] | None:
-    """`mesh_impact`, and whether faces certainly meet that are among the first so many of each shape."""
+    """`first_mesh_impact`, and whether faces certainly meet that are among the first so many of each shape."""
     if not have_kernels(kept_tree(shape_a), kept_tree(shape_b), NEVER):
         return None
     try:
@@ -78,7 +78,7 @@ def impact_in_hulls(
 ) -> tuple[float, float] | None:
     """First impact of two moving shapes in convex solids that move with them: lower of the solids, upper of the shapes.
 
-    The shapes are sought from the time on at which the solids meet. query, None: as for `mesh_impact`; also None for
+    The shapes are sought from the time on at which the solids meet. query, None: as for `first_mesh_impact`; also None for
     solids that touch at the start.
     """
     try:

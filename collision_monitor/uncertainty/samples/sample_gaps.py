@@ -189,7 +189,7 @@ def stated_gap(table, pair, n, node, margin):
 
 @inlined
 def _subtract_reaches(table, s, R, o, sign, local, gap, first, last, best):
-    """Subtract `reach_of` along sign times the directions local (3, S), in world axes, from gap (last - first,).
+    """Subtract `core_reach` along sign times the directions local (3, S), in world axes, from gap (last - first,).
 
     Only samples first:last. Overwrites local. best (last - first,): scratch.
     """

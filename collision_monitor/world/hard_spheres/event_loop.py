@@ -35,10 +35,10 @@ SEPARATION: Final = 1e-13
 again at the same time without end. The energy changes by the square of it."""
 
 EVENTS_PER_CALL: Final = 1_000_000
-"""Events of one call of `advance`: about a second, after which Ctrl-C is noticed."""
+"""Events of one call of `run_events`: about a second, after which Ctrl-C is noticed."""
 
 DONE, PAUSED, ROWS_FULL, LOG_FULL = range(4)
-"""Why `advance` returned: time reached, number of events reached, a larger `neighbours` or `log` is needed."""
+"""Why `run_events` returned: time reached, number of events reached, a larger `neighbours` or `log` is needed."""
 
 
 @kernel
