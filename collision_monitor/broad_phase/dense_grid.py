@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 from collision_monitor._jit import allocating_kernel, device, inlined
 from collision_monitor._jit.prefetch import prefetch
 from collision_monitor._jit.vectors import LANES
-from collision_monitor.broad_phase.lanes import boxes_overlap, lowest_bit, spheres_overlap
+from collision_monitor.broad_phase.lanes import boxes_overlap, lowest_bit, spheres_overlap_lanes
 from collision_monitor.broad_phase.region import Region
 from collision_monitor.errors import InputError
 from collision_monitor.tolerances import EPSILON
@@ -295,7 +295,7 @@ def keep_overlapping(grid: Any, bounds: Any, p: int, low: int, high: int, found:
     own = Region(x, y, z, bounds.extent[0, p], bounds.extent[1, p], bounds.extent[2, p])
     for q in range(low, max(high, low + 1), LANES):  # also tests an empty range, which is cheaper than a branch
         if bounds.balls:
-            bits = spheres_overlap(grid.centre, bounds.extent, q, own)
+            bits = spheres_overlap_lanes(grid.centre, bounds.extent, q, own)
         else:
             bits = boxes_overlap(grid.centre, bounds.extent, q, own)
         bits &= (1 << max(min(high - q, LANES), 0)) - 1

@@ -40,7 +40,7 @@ def _axis(builder: Any, rows: list[Any], row: int, value: Any) -> Any:
 
 
 @intrinsic
-def spheres_overlap(typing_context, centre, extent, q, ball):
+def spheres_overlap_lanes(typing_context, centre, extent, q, ball):
     """Bit k: |centre[:, q + k] - (x, y, z)|^2 <= (hx + extent[0, q + k])^2, with hx the radius of the Region `ball`.
 
     Reads LANES elements from q on.

@@ -20,7 +20,7 @@ UNKNOWN = 2
 """Result of `locate_in_surface` for a point that may be inside or outside."""
 
 
-def locate_in_surface(points: Array, surface: Surface) -> Signs:
+def locate_in_welded_surface(points: Array, surface: Surface) -> Signs:
     """Location (n,) of points (n, 3) in m in a surface, or UNKNOWN.
 
     A surface with a hole has no certain inside: a point is UNKNOWN if it is inside once the hole is closed by faces

@@ -20,6 +20,7 @@ from typing import Any, Final, NamedTuple
 from collision_monitor._jit import device, inlined
 from collision_monitor.narrow_phase.core import core_box, is_centred_box, rounding
 from collision_monitor.narrow_phase.support_value import core_support
+from collision_monitor.narrow_phase.vector import cross, dot
 from collision_monitor.shapes.shape_table import SPHERE
 from collision_monitor.tolerances import EPSILON
 
@@ -60,18 +61,6 @@ class Axis(NamedTuple):
     dx: Any
     dy: Any
     dz: Any
-
-
-@inlined
-def dot(a, b):
-    """a . b"""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@inlined
-def cross(a, b):
-    """a x b"""
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @inlined
@@ -138,7 +127,7 @@ def _line(size, x, dx, d):
 
 @inlined
 def _between_boxes(sa, sb, A, B, gap, remaining):
-    """`advance_along_axis` for cores that are boxes: the bound is the minimum of parabolas, one for each choice of their sides.
+    """`advance_along_axis` for cores that are boxes: the minimum of parabolas, one for each choice of sides.
 
     Newton's method from outside: the roots decrease until the parabola at a root is the one that gave the root.
     """

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.geometry.inside import locate_in_surface
+from collision_monitor.geometry.inside import locate_in_welded_surface
 from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.qhull import QhullResult
 from collision_monitor.narrow_phase.dispatch import contact_batch
@@ -157,7 +157,7 @@ def _inside_of_meshes(points: Array, shapes: Sequence[tuple[Shape, Pose]]) -> ND
     for shape, offset in shapes:
         if isinstance(shape, Mesh):
             own = (points - offset.position) @ offset.rotation
-            location = locate_in_surface(own, shape.surface)
+            location = locate_in_welded_surface(own, shape.surface)
             inside |= (location == Location.INSIDE) | (location == Location.BOUNDARY)
     return inside
 

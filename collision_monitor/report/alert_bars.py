@@ -10,8 +10,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from collision_monitor.alerts.thresholds import LEVELS
-from collision_monitor.report.rendering import Size, shortened
+from collision_monitor.report.rendering import Size
 from collision_monitor.session.history.history import History
+from collision_monitor.settings.names import shortened
 
 COLOURS: Final = ("#d9b61c", "#e0812a", "#c0302b")
 """Of the levels, from the lowest on."""

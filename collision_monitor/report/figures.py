@@ -15,9 +15,10 @@ from matplotlib.patches import Patch
 from collision_monitor.report.alert_bars import alert_figure
 from collision_monitor.report.facts import ReportFacts
 from collision_monitor.report.from_above import from_above
-from collision_monitor.report.rendering import CONTACT, INK, PALETTE, POSSIBLE, STYLE, WARNING, Size, shortened
+from collision_monitor.report.rendering import CONTACT, INK, PALETTE, POSSIBLE, STYLE, WARNING, Size
 from collision_monitor.session.history.alerts import stated_error
 from collision_monitor.session.history.history import CollisionEvent, Floats, History, Pair
+from collision_monitor.settings.names import shortened
 
 PAIRS: Final = 16
 """Largest number of rows of the timeline."""

@@ -53,14 +53,6 @@ NARROW: Final = Size("narrow", 3.9, 1)
 _WITHOUT_METADATA: Final[Any] = dict.fromkeys(("Date", "Creator", "Format", "Type"))
 
 
-def shortened(name: str, longest: int = 18) -> str:
-    """Return the name on one line. A long name keeps its beginning and end, where names often differ."""
-    name = "".join(letter if letter.isprintable() else " " for letter in name)
-    if len(name) <= longest:
-        return name
-    return f"{name[: longest // 2]}…{name[len(name) - longest // 2 + 1 :]}"
-
-
 def as_svg(figure: Figure, name: str) -> str:
     """Return the figure as an SVG element for HTML. Equal figures give equal bytes.
 

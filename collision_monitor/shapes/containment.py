@@ -9,7 +9,7 @@ import numpy as np
 from collision_monitor.errors import UnsupportedError
 from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.coordinates import Array, Booleans
-from collision_monitor.geometry.inside import locate_in_surface
+from collision_monitor.geometry.inside import locate_in_welded_surface
 from collision_monitor.geometry.point_in_polygon import Location, locate_in_convex, locate_in_polygon
 from collision_monitor.geometry.points import closest_point_on_segment
 from collision_monitor.geometry.polygons import is_convex
@@ -83,7 +83,7 @@ def _closed_form(shape: Shape, p: Array) -> Booleans:
                 f"Mesh: expected a closed surface, which has an inside, got one that is {shape.surface}"
             )
         case Mesh():
-            found = locate_in_surface(p, shape.surface) != Location.OUTSIDE
+            found = locate_in_welded_surface(p, shape.surface) != Location.OUTSIDE
         case Points():
             found = _to_nearest(shape.points, p) <= shape.radius
         case Polygon() if shape.radius > 0.0:

@@ -8,6 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.settings.names import shortened
 from collision_monitor.view.levels import Level, Pair, contact_levels, prediction_levels
 from collision_monitor.view.moment import Moment
 
@@ -26,7 +27,7 @@ class PairRow(NamedTuple):
     @property
     def text(self) -> str:
         """One line for people."""
-        return f"{self.when}  {shortened(self.names[0])} – {shortened(self.names[1])}"
+        return f"{self.when}  {shortened(self.names[0], LONGEST_NAME)} – {shortened(self.names[1], LONGEST_NAME)}"
 
 
 def soonest_pairs(moment: Moment, most: int) -> list[PairRow]:
@@ -65,10 +66,3 @@ def _row(moment: Moment, row: np.void, when: str, level: Level, place: NDArray[n
         place = moment.state["position"][at].mean(axis=0) if (at >= 0).all() else np.full(3, np.nan)
     known = np.array(place, np.float64) if np.isfinite(place).all() else None
     return PairRow((a, b), (moment.name_of(a), moment.name_of(b)), when, level, known)
-
-
-def shortened(name: str) -> str:
-    """Return the name on one line. A long name keeps its beginning and end, where names often differ."""
-    name = "".join(letter if letter.isprintable() else " " for letter in name)
-    half = LONGEST_NAME // 2
-    return name if len(name) <= LONGEST_NAME else f"{name[:half]}…{name[len(name) - half + 1 :]}"

@@ -6,7 +6,8 @@ from functools import partial
 from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Final
 
-from collision_monitor.view.pair_list import shortened
+from collision_monitor.settings.names import shortened
+from collision_monitor.view.pair_list import LONGEST_NAME
 from collision_monitor.view.panel import Request
 from collision_monitor.view.player import Player
 from collision_monitor.view.recording import Beginning, Recording
@@ -51,7 +52,9 @@ class PlayerControls:
 
     def _text(self, begin: Beginning) -> str:
         names = self._recording.names
-        pair = " – ".join(shortened(names.get(object_id, f"object_{object_id}")) for object_id in begin.pair)
+        pair = " – ".join(
+            shortened(names.get(object_id, f"object_{object_id}"), LONGEST_NAME) for object_id in begin.pair
+        )
         return f"{self._recording.times[begin.frame]:.2f} s  {pair}"
 
     def show(self) -> None:

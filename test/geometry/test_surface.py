@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from solids import CONCAVE, cube, voxels
 
 import collision_monitor as cm
-from collision_monitor.geometry.inside import UNKNOWN, locate_in_surface
+from collision_monitor.geometry.inside import UNKNOWN, locate_in_welded_surface
 from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.surface import Surface, first_equal
 
@@ -34,7 +34,7 @@ def together(*solids):
 
 
 def locate(solid, points):
-    return locate_in_surface(np.asarray(points, float), Surface(*solid))
+    return locate_in_welded_surface(np.asarray(points, float), Surface(*solid))
 
 
 def test_equal_vertices_are_one_point():
@@ -121,8 +121,8 @@ def test_a_mesh_with_a_hole_knows_the_outside_and_never_claims_the_inside(seed):
     points = rng.uniform(low, high, (60, 3))
     if surface.sheet:
         return
-    truth = locate_in_surface(points, Surface(vertices, faces))
-    found = locate_in_surface(points, surface)
+    truth = locate_in_welded_surface(points, Surface(vertices, faces))
+    found = locate_in_welded_surface(points, surface)
     # between the missing faces and those that close the hole, only the box around it is known
     hole = surface.hole
     beside = ((points < hole.min(axis=0)) | (points > hole.max(axis=0))).any(axis=1)

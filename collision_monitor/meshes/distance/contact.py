@@ -52,8 +52,8 @@ def tree_contact(
 ) -> int:
     """Write the contact of two trees into a contact row if they are at most `limit` (m) apart; return what is known.
 
-    pose: as for every pair test. answer: of `nearest_triangles`, with a hint or not. If surfaces touch, the depth is that of the
-    deepest pair of triangles. The bound holds round-off only: what parts concave solids may be longer.
+    pose: as for every pair test. answer: of `nearest_triangles`, with a hint or not. If surfaces touch, the depth is
+    that of the deepest pair of triangles. The bound holds round-off only: what parts concave solids may be longer.
     """
     X = relative(pose.R_A, pose.R_B, pose.p)
     round_off = SAT_ROUND_OFF * (reach_in(blocks_a, root_a) + reach_in(blocks_b, root_b) + sum_of_sizes(pose.p))

@@ -10,7 +10,7 @@ from math import inf, sqrt
 from typing import Any
 
 from collision_monitor._jit import device
-from collision_monitor.meshes.distance.point_solid import point_distance
+from collision_monitor.meshes.distance.point_solid import point_solid_distance
 from collision_monitor.narrow_phase.vector import Vector, dot
 from collision_monitor.shapes.shape_table import CONE, ELLIPSOID
 
@@ -27,7 +27,7 @@ def point_range(table: Any, s: int, x: Vector) -> tuple[float, float, Vector]:
         return distance, distance, n
     if kind == ELLIPSOID:
         return _of_ellipsoid((table.size[s, 0], table.size[s, 1], table.size[s, 2]), x)
-    distance, n, is_exact = point_distance(table, s, x)
+    distance, n, is_exact = point_solid_distance(table, s, x)
     return distance, distance if is_exact else inf, n
 
 

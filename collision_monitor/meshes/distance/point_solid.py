@@ -17,7 +17,7 @@ from collision_monitor.shapes.shape_table import BOX, CAPSULE, CYLINDER, HALF_SP
 
 
 @device
-def point_distance(table: Any, s: int, x: Vector) -> tuple[float, Vector, bool]:
+def point_solid_distance(table: Any, s: int, x: Vector) -> tuple[float, Vector, bool]:
     """Signed distance (m) of a point, in the frame of a solid without margin, its direction out of the solid, and True.
 
     False: the distance is a lower bound, along the direction.

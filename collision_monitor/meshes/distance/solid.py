@@ -17,7 +17,7 @@ from collision_monitor.meshes.boxes import half_of
 from collision_monitor.meshes.distance.contact import reach_in
 from collision_monitor.meshes.distance.feature import slot_tie, triangle_feature
 from collision_monitor.meshes.distance.nearest import NEAR_A, triangle_at
-from collision_monitor.meshes.distance.point_solid import point_distance
+from collision_monitor.meshes.distance.point_solid import point_solid_distance
 from collision_monitor.meshes.distance.triangle_pair import Corners
 from collision_monitor.meshes.layout import CENTER, CHILD, FACE, RADIUS, WIDTH
 from collision_monitor.meshes.overlap.touching_triangles import repeats
@@ -115,7 +115,7 @@ def _point_contact(
 ) -> bool:
     """As `triangle_solid_contact`, for a point of A: in closed form where there is one, otherwise by GJK and EPA."""
     y = place_point(inverse(relative(pose.R_A, pose.R_B, pose.p)), x)
-    distance, d, is_exact = point_distance(table, b, y)
+    distance, d, is_exact = point_solid_distance(table, b, y)
     x = rotate(pose.R_A, x)
     if is_exact:
         n = rotate(pose.R_B, d)
@@ -198,7 +198,7 @@ def solid_contact(
                 if blocks[block, CHILD, k] == 0.0:
                     continue
                 c = center_of(blocks, block, k)
-                bound, n, _ = point_distance(table, b, place_point(Y, c))
+                bound, n, _ = point_solid_distance(table, b, place_point(Y, c))
                 n = minus(place_point(X, n), (X.x, X.y, X.z))
                 bound -= box_reach_along(blocks, block, k, n) + margin + table.margin[b]
                 if bound <= enough:
@@ -210,7 +210,7 @@ def solid_contact(
             T = triangle_at(blocks, block, k)
             radius = blocks[block, RADIUS, k] + margin
             c, size = _middle(T)
-            bound, _, _ = point_distance(table, b, place_point(Y, c))
+            bound, _, _ = point_solid_distance(table, b, place_point(Y, c))
             if bound - size - radius - table.margin[b] > enough:
                 continue
             examined += 1
@@ -317,5 +317,5 @@ def leaf_solid_time(
 @inlined
 def _distance_along(solid: MovingSolid, c: Vector) -> tuple[float, Vector]:
     """Lower bound on the distance (m) of a point of A's frame from the solid, and its direction to the solid."""
-    bound, n, _ = point_distance(solid.table, solid.b, place_point(inverse(solid.X), c))
+    bound, n, _ = point_solid_distance(solid.table, solid.b, place_point(inverse(solid.X), c))
     return bound, opposite(minus(place_point(solid.X, n), (solid.X.x, solid.X.y, solid.X.z)))

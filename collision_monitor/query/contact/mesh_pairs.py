@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 _ROTATIONS: Final = MEMORY
 _ANSWER: Final = _ROTATIONS + 18
 _MEMORY: Final = _ANSWER + ANSWER
-"""Parts of the scratch memory: that of a query, both rotations (2, 3, 3) to world axes, and the answer of `nearest_triangles`."""
+"""Parts of the scratch memory: a query, both rotations (2, 3, 3) to world axes, the answer of `nearest_triangles`."""
 
 _ROUNDED_UP: Final = 1.0 + 8.0 * EPSILON
 

@@ -8,7 +8,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.geometry.inside import UNKNOWN, locate_in_surface
+from collision_monitor.geometry.inside import UNKNOWN, locate_in_welded_surface
 from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.meshes.distance.contact import APART, OPEN, contact_of_trees, in_root_box, tree_reach
 from collision_monitor.meshes.distance.nearest import MEMORY, answer_row
@@ -136,7 +136,7 @@ def locate_in_meshes(inner: Posed, outer: Posed, offset: Array) -> int:
         own = own if tree is None else own[in_root_box(tree, own)]
         if len(own):
             some = own[: max(MOST_TESTS // len(shape.faces), 1)]
-            location = locate_in_surface(some, shape.surface)
+            location = locate_in_welded_surface(some, shape.surface)
             if ((location == Location.INSIDE) | (location == Location.BOUNDARY)).any():
                 return Location.INSIDE
             if len(some) < len(own) or (location == UNKNOWN).any():

@@ -78,8 +78,8 @@ def impact_in_hulls(
 ) -> tuple[float, float] | None:
     """First impact of two moving shapes in convex solids that move with them: lower of the solids, upper of the shapes.
 
-    The shapes are sought from the time on at which the solids meet. query, None: as for `first_mesh_impact`; also None for
-    solids that touch at the start.
+    The shapes are sought from the time on at which the solids meet. query, None: as for `first_mesh_impact`; also None
+    for solids that touch at the start.
     """
     try:
         hulls = hull_a.packed_shape, hull_b.packed_shape  # type: ignore[attr-defined]

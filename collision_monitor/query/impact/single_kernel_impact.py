@@ -41,7 +41,7 @@ def single_kernel_impact(
 def quick_open_impact(
     shape_a: Compound, motion_a: Motion, shape_b: Compound, motion_b: Motion, query: MotionQuery
 ) -> tuple[float, float] | None:
-    """`single_kernel_impact` with an open mesh: lower of the solids that the surfaces may belong to, upper of the surfaces.
+    """`single_kernel_impact` with an open mesh: lower of the solids that it may belong to, upper of the surface.
 
     The surfaces are sought from the time on before which the boxes that contain them do not meet.
     """

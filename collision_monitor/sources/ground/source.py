@@ -1,7 +1,7 @@
 """The interface between a source and the pipeline.
 
-A source takes messages of its topics and writes what they hold into the `SourceScene`: descriptions, removals and states in
-the monitor's frame. The `Feed` gives it the messages, decides when a step is made, and turns the scene into
+A source takes messages of its topics and writes what they hold into the `SourceScene`: descriptions, removals and
+states in the monitor's frame. The `Feed` gives it the messages, decides when a step is made, and turns the scene into
 ObjectDescriptionArray and ObjectStateArray bytes. Neither knows whether a message came from DDS or from a bag.
 
 A further kind of source is one class with these four members, and one line in `kinds.py`: in `BY_TYPE` if an entry of
