@@ -41,7 +41,7 @@ MEMORY: Final = PAIRS + 2 * MOST_PAIRS
 """Numbers of scratch memory of a query."""
 
 BETWEEN: Final = PAIRS
-"""Bounds on the squared distances of all pairs of triangles of two leaves (m^2); also the pairs of `touching_triangles`."""
+"""Bounds on the squared distances of the triangles of two leaves (m^2); also the pairs of `touching_triangles`."""
 
 # columns of an answer
 SQUARED: Final = 0
