@@ -18,9 +18,9 @@ from math import copysign, inf, sqrt
 from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.vector import cross, dot
 from collision_monitor.narrow_phase.core import core_box, is_centred_box, rounding
 from collision_monitor.narrow_phase.support_value import core_support
-from collision_monitor.narrow_phase.vector import cross, dot
 from collision_monitor.shapes.shape_table import SPHERE
 from collision_monitor.tolerances import EPSILON
 

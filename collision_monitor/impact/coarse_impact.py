@@ -16,6 +16,7 @@ import numpy as np
 from collision_monitor._jit import device, inlined, kernel, outlined
 from collision_monitor._jit.direct import direct
 from collision_monitor._jit.prefetch import prefetch
+from collision_monitor.geometry.vector import dot
 from collision_monitor.impact.body_impact import ShapePair, Tube, body_impact, closing_speed, tube_of
 from collision_monitor.impact.coarse_solid import solid_near, solid_overlaps
 from collision_monitor.impact.coarse_trees import TOO_MANY, SearchEnd, pose_at, trees_near, trees_overlap
@@ -33,7 +34,6 @@ from collision_monitor.impact.sphere_interval import meeting_of_spheres, relativ
 from collision_monitor.meshes.overlap.inside import OUTSIDE
 from collision_monitor.motion.motion import half_acceleration, relative_position, relative_velocity
 from collision_monitor.narrow_phase.contact_row import NORMAL, POINT_A, POINT_B
-from collision_monitor.narrow_phase.vector import dot
 from collision_monitor.shapes.shape_table import HALF_SPACE
 
 TRIES: Final = (1.5, 4.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import inf, sqrt
 
 from collision_monitor._jit import device
+from collision_monitor.geometry.vector import cross, dot, minus
 from collision_monitor.impact.coarse_trees import KEEP, STEPS, TOO_MANY, box_radius, nearness, pose_at
 from collision_monitor.impact.impact_record import CLEAR, UNRESOLVED
 from collision_monitor.impact.mesh_pair import is_mesh, root_of
@@ -29,7 +30,6 @@ from collision_monitor.narrow_phase.contact_row import BOUND, POINT_A, POINT_B
 from collision_monitor.narrow_phase.core import core_length
 from collision_monitor.narrow_phase.dispatch import mirror
 from collision_monitor.narrow_phase.pair_pose import PairPose, swapped
-from collision_monitor.narrow_phase.vector import cross, dot, minus
 
 
 @device

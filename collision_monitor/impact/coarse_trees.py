@@ -9,6 +9,7 @@ from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.vector import dot
 from collision_monitor.impact.impact_record import CLEAR, UNRESOLVED
 from collision_monitor.impact.mesh_pair import root_of, triangles_contact
 from collision_monitor.impact.tree_impact import HEAP, open_box, pop_first, push_pair, times_of, tree_approach_at
@@ -21,7 +22,6 @@ from collision_monitor.meshes.placing import place_point, relative
 from collision_monitor.motion.bodies import place_shape
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, POINT_A, POINT_B
 from collision_monitor.narrow_phase.pair_pose import PairPose
-from collision_monitor.narrow_phase.vector import dot
 
 KEEP: Final = 1.0
 """A pair of boxes is kept while its next step allows a motion longer than this part of the box that would be opened."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import inf, sqrt
 
 from collision_monitor._jit import device, inlined, outlined
+from collision_monitor.geometry.vector import along, dot, minus, opposite, rotate, rotate_back, sum_of_sizes
 from collision_monitor.meshes.distance.contact import FARTHER, OPEN, tree_contact
 from collision_monitor.meshes.distance.feature import (
     feature_in_triangle,
@@ -31,7 +32,6 @@ from collision_monitor.narrow_phase.contact_row import (
 )
 from collision_monitor.narrow_phase.dispatch import contact_within, mirror
 from collision_monitor.narrow_phase.pair_pose import swapped
-from collision_monitor.narrow_phase.vector import along, dot, minus, opposite, rotate, rotate_back, sum_of_sizes
 from collision_monitor.shapes.shape_table import CONVEX_HULL, HALF_SPACE, MESH, POINTS, TREE
 from collision_monitor.tolerances import FEATURE_TIE, SAT_ROUND_OFF
 

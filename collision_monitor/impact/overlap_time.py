@@ -6,13 +6,13 @@ from math import inf, sqrt
 from typing import Final
 
 from collision_monitor._jit import inlined, outlined
+from collision_monitor.geometry.vector import dot, sum_of_sizes
 from collision_monitor.impact.mesh_pair import has_mesh, have_trees, root_of
 from collision_monitor.impact.tree_impact import tree_approach_at
 from collision_monitor.meshes.advance.approach import time_until
 from collision_monitor.meshes.distance.contact import reach_in
 from collision_monitor.meshes.overlap.common_point import bounds_solid, common_ball
 from collision_monitor.meshes.placing import relative
-from collision_monitor.narrow_phase.vector import dot, sum_of_sizes
 from collision_monitor.tolerances import GJK_TOUCHING, SAT_ROUND_OFF
 
 MOST_TIMES: Final = 5

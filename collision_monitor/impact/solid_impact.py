@@ -9,6 +9,7 @@ from math import inf, sqrt
 from typing import Final
 
 from collision_monitor._jit import outlined
+from collision_monitor.geometry.vector import dot
 from collision_monitor.impact.impact_record import CLEAR, HIT, UNRESOLVED
 from collision_monitor.impact.mesh_pair import root_of
 from collision_monitor.impact.tree_impact import (
@@ -29,7 +30,6 @@ from collision_monitor.meshes.layout import CHILD, WIDTH
 from collision_monitor.meshes.placing import relative
 from collision_monitor.narrow_phase.core import core_length
 from collision_monitor.narrow_phase.pair_pose import PairPose
-from collision_monitor.narrow_phase.vector import dot
 from collision_monitor.shapes.shape_table import HALF_SPACE
 
 EXAMINED: Final = 30

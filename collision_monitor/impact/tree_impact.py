@@ -13,6 +13,7 @@ from math import inf, sqrt
 from typing import Final
 
 from collision_monitor._jit import device, inlined, outlined
+from collision_monitor.geometry.vector import cross, dot, minus, plus, rotate_back
 from collision_monitor.impact.impact_record import CLEAR, HIT, UNRESOLVED
 from collision_monitor.meshes.advance.approach import Approach, seen_from_b
 from collision_monitor.meshes.advance.box_times import box_times
@@ -23,7 +24,6 @@ from collision_monitor.meshes.layout import CHILD, WIDTH
 from collision_monitor.meshes.placing import inverse, relative
 from collision_monitor.motion.bodies import place_shape
 from collision_monitor.motion.motion import relative_position, relative_velocity, rotation_at
-from collision_monitor.narrow_phase.vector import cross, dot, minus, plus, rotate_back
 from collision_monitor.shapes.shape_table import TREE
 from collision_monitor.tolerances import EPSILON
 

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, kernel
+from collision_monitor.geometry.vector import Vector, dot
 from collision_monitor.meshes.boxes import half_of
 from collision_monitor.meshes.distance.nearest import MEMORY, triangle_at
 from collision_monitor.meshes.layout import CENTER, CHILD, RADIUS, WIDTH
 from collision_monitor.meshes.placing import turned_back
-from collision_monitor.narrow_phase.vector import Vector, dot
 
 Array = NDArray[np.float64]
 

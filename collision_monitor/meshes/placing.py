@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from collision_monitor._jit import inlined
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.meshes.distance.triangle_pair import Corners
 from collision_monitor.meshes.layout import AXES
-from collision_monitor.narrow_phase.vector import Vector
 
 
 class Placing(NamedTuple):

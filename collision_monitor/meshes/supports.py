@@ -20,10 +20,10 @@ from numba.extending import intrinsic
 from collision_monitor._jit import device, inlined
 from collision_monitor._jit.lanes import Lanes, load_lanes, store
 from collision_monitor._jit.vectors import DOUBLES
+from collision_monitor.geometry.vector import Vector, dot
 from collision_monitor.meshes.boxes import Block, inner
 from collision_monitor.meshes.layout import AXES, CENTER, CORNERS_OF_BOX, EDGES, HALF, ROWS, WIDTH
 from collision_monitor.meshes.placing import turned_back
-from collision_monitor.narrow_phase.vector import Vector, dot
 
 PLANES: Final = ((0, 1, 2), (0, 2, 1), (1, 2, 0))
 """Two axes whose sums are in four rows of EDGES, and the third axis."""

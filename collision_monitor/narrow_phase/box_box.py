@@ -10,6 +10,18 @@ from math import copysign, inf, sqrt
 from typing import Any, NamedTuple
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.vector import (
+    Vector,
+    along,
+    column,
+    cross,
+    dot,
+    minus,
+    opposite,
+    plus,
+    rotate_back,
+    scaled,
+)
 from collision_monitor.narrow_phase.contact_row import (
     DISTANCE,
     EDGE,
@@ -26,18 +38,6 @@ from collision_monitor.narrow_phase.convex_convex import convex_contact
 from collision_monitor.narrow_phase.core import half_extents
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.segment import segment_segment
-from collision_monitor.narrow_phase.vector import (
-    Vector,
-    along,
-    column,
-    cross,
-    dot,
-    minus,
-    opposite,
-    plus,
-    rotate_back,
-    scaled,
-)
 from collision_monitor.tolerances import FACE_PREFERENCE, FEATURE_TIE, PARALLEL_SIN2, SAT_ROUND_OFF
 
 # Sections of the scratch memory: the features, and two polygons of rows (u, v).

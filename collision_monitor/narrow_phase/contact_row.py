@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import inlined
-from collision_monitor.narrow_phase.vector import Vector
+from collision_monitor.geometry.vector import Vector
 
 CONTACT_ROW: Final = np.dtype(
     [

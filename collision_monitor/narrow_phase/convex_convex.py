@@ -10,6 +10,7 @@ from math import inf, sqrt
 from typing import Any
 
 from collision_monitor._jit import inlined
+from collision_monitor.geometry.vector import along, dot, opposite, rotate
 from collision_monitor.narrow_phase.contact_row import write
 from collision_monitor.narrow_phase.core import CorePair, core_length, core_pair, core_radius, rounding
 from collision_monitor.narrow_phase.epa import epa
@@ -17,7 +18,6 @@ from collision_monitor.narrow_phase.gjk import EXACT, Accuracy, gjk, point_on_a,
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.parallel_axes import axes_are_parallel, parallel_axes_depth
 from collision_monitor.narrow_phase.support_point import support_difference
-from collision_monitor.narrow_phase.vector import along, dot, opposite, rotate
 from collision_monitor.narrow_phase.work_memory import MAX_VERTICES, P_AB, R_AB, SPARE, WEIGHTS
 from collision_monitor.shapes.shape_table import CONE, CYLINDER, ELLIPSOID
 from collision_monitor.tolerances import EPA_CURVED, EPA_CURVED_POINTS, EPA_POLYTOPE, GJK_TOUCHING, SAT_ROUND_OFF

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from collision_monitor._jit import inlined
-from collision_monitor.narrow_phase.vector import Vector
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.shapes.shape_table import BOX, CAPSULE, SPHERE
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.narrow_phase.box_box import box_box_contact, box_box_separation
 from collision_monitor.narrow_phase.capsule_capsule import capsule_capsule_contact
 from collision_monitor.narrow_phase.contact_row import (
@@ -35,7 +36,6 @@ from collision_monitor.narrow_phase.polygon_polygon import planar_contact
 from collision_monitor.narrow_phase.sphere_box import sphere_box_contact, sphere_box_separation
 from collision_monitor.narrow_phase.sphere_cone import sphere_cone_contact
 from collision_monitor.narrow_phase.sphere_sphere import sphere_sphere_contact, sphere_sphere_separation
-from collision_monitor.narrow_phase.vector import Vector
 from collision_monitor.narrow_phase.work_memory import WORK_SIZE
 from collision_monitor.shapes.shape_table import (
     BOX,

@@ -6,11 +6,7 @@ from math import inf, sqrt
 from typing import Any
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.narrow_phase.contact_row import DISTANCE, FACE, FEATURE_TYPE_A, FEATURE_TYPE_B, write
-from collision_monitor.narrow_phase.core import core_of, rounding
-from collision_monitor.narrow_phase.pair_pose import PairPose
-from collision_monitor.narrow_phase.support_point import support_point
-from collision_monitor.narrow_phase.vector import (
+from collision_monitor.geometry.vector import (
     Vector,
     along,
     cross,
@@ -22,6 +18,10 @@ from collision_monitor.narrow_phase.vector import (
     scaled,
     sum_of_sizes,
 )
+from collision_monitor.narrow_phase.contact_row import DISTANCE, FACE, FEATURE_TYPE_A, FEATURE_TYPE_B, write
+from collision_monitor.narrow_phase.core import core_of, rounding
+from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.narrow_phase.support_point import support_point
 from collision_monitor.tolerances import OPPOSED, SAT_ROUND_OFF
 
 

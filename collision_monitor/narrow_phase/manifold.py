@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, kernel
+from collision_monitor.geometry.vector import Vector, cross, dot, minus, opposite, rotate, scaled
 from collision_monitor.narrow_phase.contact_row import DISTANCE, NORMAL, POINT_A
 from collision_monitor.narrow_phase.pair_pose import PairPose, pair_pose
-from collision_monitor.narrow_phase.vector import Vector, cross, dot, minus, opposite, rotate, scaled
 from collision_monitor.narrow_phase.work_memory import work_array
 from collision_monitor.records import MOST_POINTS
 from collision_monitor.shapes.shape_table import BOX, CONVEX_HULL, HALF_SPACE, POLYGON

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from collision_monitor._jit import inlined
-from collision_monitor.narrow_phase.vector import opposite
+from collision_monitor.geometry.vector import opposite
 
 
 class PairPose(NamedTuple):

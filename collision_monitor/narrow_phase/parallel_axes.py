@@ -11,8 +11,8 @@ from math import copysign, inf, sqrt
 from typing import Any
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.narrow_phase.core import Core
-from collision_monitor.narrow_phase.vector import Vector
 from collision_monitor.narrow_phase.work_memory import P_AB, R_AB
 from collision_monitor.shapes.shape_table import CAPSULE, CONE, CYLINDER, SPHERE
 from collision_monitor.tolerances import FEATURE_TIE, SEGMENT_PARALLEL_SIN2

@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 from collision_monitor._jit import inlined
-from collision_monitor.narrow_phase.vector import Vector, cross, dot
+from collision_monitor.geometry.vector import Vector, cross, dot
 from collision_monitor.tolerances import SEGMENT_PARALLEL_SIN2
 
 

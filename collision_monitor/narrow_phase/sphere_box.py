@@ -6,6 +6,15 @@ from math import copysign, sqrt
 from typing import Any
 
 from collision_monitor._jit import inlined
+from collision_monitor.geometry.vector import (
+    Vector,
+    direction,
+    opposite,
+    rotate,
+    rotate_back,
+    scaled,
+    sum_of_sizes,
+)
 from collision_monitor.narrow_phase.contact_row import (
     EDGE,
     FACE,
@@ -15,15 +24,6 @@ from collision_monitor.narrow_phase.contact_row import (
     SURFACE,
     VERTEX,
     write,
-)
-from collision_monitor.narrow_phase.vector import (
-    Vector,
-    direction,
-    opposite,
-    rotate,
-    rotate_back,
-    scaled,
-    sum_of_sizes,
 )
 from collision_monitor.tolerances import EPSILON
 

@@ -10,8 +10,8 @@ from math import copysign, sqrt
 from typing import Any
 
 from collision_monitor._jit import inlined
+from collision_monitor.geometry.vector import Vector, minus, opposite
 from collision_monitor.narrow_phase.core import Core, CorePair
-from collision_monitor.narrow_phase.vector import Vector, minus, opposite
 from collision_monitor.narrow_phase.vertex_scan import farthest_vertex
 from collision_monitor.narrow_phase.work_memory import ON_A, P_AB, R_AB
 from collision_monitor.shapes.shape_table import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, SPHERE

@@ -16,7 +16,7 @@ from numpy import float32
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.narrow_phase.vector import cross
+from collision_monitor.geometry.vector import cross
 from collision_monitor.shapes.shape_table import BOX, CAPSULE, CIRCLE, CYLINDER, SPHERE
 from collision_monitor.uncertainty.samples.normal_samples import FURTHEST
 

@@ -10,11 +10,11 @@ from math import inf, sqrt
 from typing import Final
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.vector import cross, dot
 from collision_monitor.motion.bodies import place_shape
 from collision_monitor.motion.motion import half_acceleration
 from collision_monitor.narrow_phase.cylinder_cylinder import is_parallel
 from collision_monitor.narrow_phase.pair_pose import PairPose
-from collision_monitor.narrow_phase.vector import cross, dot
 from collision_monitor.shapes.shape_table import CYLINDER, SPHERE
 from collision_monitor.uncertainty.pair_errors import spin_rate, turned_at
 from collision_monitor.uncertainty.samples.error_samples import LEFT_OVER, ORIENTATION, errors_turn

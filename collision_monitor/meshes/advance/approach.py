@@ -12,8 +12,8 @@ from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import inlined
+from collision_monitor.geometry.vector import Vector, opposite
 from collision_monitor.meshes.placing import Placing, turn_back
-from collision_monitor.narrow_phase.vector import Vector, opposite
 
 STRETCH: Final = 2.0
 """Factor by which a step may exceed that with the largest acceleration of any time. Larger: the bounds on the speed and

@@ -15,6 +15,7 @@ from numba.extending import intrinsic
 
 from collision_monitor._jit import device
 from collision_monitor._jit.lanes import Lanes, load_lanes, store
+from collision_monitor.geometry.vector import Vector, cross, dot, minus, opposite
 from collision_monitor.meshes.advance.approach import Approach, time_until
 from collision_monitor.meshes.advance.box_times import curvature_until, times_open
 from collision_monitor.meshes.boxes import Block, inner
@@ -24,7 +25,6 @@ from collision_monitor.meshes.distance.nearest import toward, triangle_at
 from collision_monitor.meshes.distance.triangle_pair import closest_triangle_points
 from collision_monitor.meshes.layout import CORNERS, RADIUS, WIDTH
 from collision_monitor.meshes.placing import Placing, place_triangle, turn_back
-from collision_monitor.narrow_phase.vector import Vector, cross, dot, minus, opposite
 
 SHARE: Final = 0.7
 """Share of the time of the best pair known that is a good enough bound. Larger: more pairs are looked at. Smaller: more

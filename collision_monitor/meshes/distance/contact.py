@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import inlined, kernel, outlined
+from collision_monitor.geometry.vector import along, dot, minus, opposite, rotate, sum_of_sizes
 from collision_monitor.meshes.distance.nearest import LEAST, MOST_PAIRS, ON_A, ON_B, PLACE_A, nearest_triangles
 from collision_monitor.meshes.layout import AXES, CENTER, HALF, RADIUS, REACH, WIDTH
 from collision_monitor.meshes.overlap.inside import INSIDE, UNKNOWN, is_either_in
@@ -16,7 +17,6 @@ from collision_monitor.meshes.overlap.touching_triangles import deepest_touching
 from collision_monitor.meshes.placing import relative
 from collision_monitor.narrow_phase.contact_row import write
 from collision_monitor.narrow_phase.pair_pose import PairPose
-from collision_monitor.narrow_phase.vector import along, dot, minus, opposite, rotate, sum_of_sizes
 from collision_monitor.tolerances import SAT_ROUND_OFF
 
 FARTHER, APART, TOUCHING, ENCLOSED, OPEN = range(5)

@@ -6,10 +6,10 @@ from math import inf, sqrt
 from typing import Any, Final
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.vector import Vector, along, dot, minus
 from collision_monitor.meshes.distance.triangle_pair import Corners, normal
 from collision_monitor.narrow_phase.contact_row import EDGE, FACE, VERTEX
 from collision_monitor.narrow_phase.gjk import closest_on_triangle, weighted
-from collision_monitor.narrow_phase.vector import Vector, along, dot, minus
 from collision_monitor.shapes.shape_table import CONE, CYLINDER, ELLIPSOID
 from collision_monitor.tolerances import FEATURE_TIE
 

@@ -13,10 +13,10 @@ from numba.extending import intrinsic
 
 from collision_monitor._jit import device, inlined
 from collision_monitor._jit.lanes import Lanes, load_lanes, store
+from collision_monitor.geometry.vector import Vector, opposite
 from collision_monitor.meshes.boxes import Block, inner
 from collision_monitor.meshes.layout import CORNERS, RADIUS, WIDTH
 from collision_monitor.meshes.placing import Placing, turn_back
-from collision_monitor.narrow_phase.vector import Vector, opposite
 
 PAIRS_OF_LEAVES: Final = WIDTH * WIDTH
 

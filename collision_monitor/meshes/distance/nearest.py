@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
+from collision_monitor.geometry.vector import dot, minus, opposite
 from collision_monitor.meshes.boxes import raise_by_gaps, triangle_bounds
 from collision_monitor.meshes.boxes_below import boxes_below, count_of, first_of
 from collision_monitor.meshes.distance.leaf_bounds import farthest_along, least_of_pairs, raise_bounds
@@ -22,7 +23,6 @@ from collision_monitor.meshes.distance.triangle_pair import Corners, closest_tri
 from collision_monitor.meshes.layout import CENTER, CHILD, CORNERS, FACE, HALF, RADIUS, WIDTH
 from collision_monitor.meshes.placing import inverse, place_point, place_triangle, relative, turn_back
 from collision_monitor.meshes.supports import content_reach_along, support_bounds
-from collision_monitor.narrow_phase.vector import dot, minus, opposite
 from collision_monitor.tolerances import EPSILON
 
 DEEPEST: Final = 24

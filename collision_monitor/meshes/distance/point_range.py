@@ -10,8 +10,8 @@ from math import inf, sqrt
 from typing import Any
 
 from collision_monitor._jit import device
+from collision_monitor.geometry.vector import Vector, dot
 from collision_monitor.meshes.distance.point_solid import point_solid_distance
-from collision_monitor.narrow_phase.vector import Vector, dot
 from collision_monitor.shapes.shape_table import CONE, ELLIPSOID
 
 

@@ -11,8 +11,8 @@ from math import sqrt
 from typing import Any
 
 from collision_monitor._jit import device
+from collision_monitor.geometry.vector import Vector, dot
 from collision_monitor.narrow_phase.support_value import core_support
-from collision_monitor.narrow_phase.vector import Vector, dot
 from collision_monitor.shapes.shape_table import BOX, CAPSULE, CYLINDER, HALF_SPACE, SPHERE
 
 

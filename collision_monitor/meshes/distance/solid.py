@@ -12,6 +12,17 @@ from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
 from collision_monitor._jit.vectors import LANES
+from collision_monitor.geometry.vector import (
+    Vector,
+    along,
+    cross,
+    dot,
+    minus,
+    opposite,
+    rotate,
+    rotate_back,
+    sum_of_sizes,
+)
 from collision_monitor.meshes.advance.approach import Approach, time_until
 from collision_monitor.meshes.boxes import half_of
 from collision_monitor.meshes.distance.contact import reach_in
@@ -38,17 +49,6 @@ from collision_monitor.narrow_phase.core import Core, CorePair, core_length, cor
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.sphere_cone import sphere_cone_contact
 from collision_monitor.narrow_phase.support_value import core_support
-from collision_monitor.narrow_phase.vector import (
-    Vector,
-    along,
-    cross,
-    dot,
-    minus,
-    opposite,
-    rotate,
-    rotate_back,
-    sum_of_sizes,
-)
 from collision_monitor.shapes.shape_table import CONE, CONVEX_HULL, HALF_SPACE, SPHERE
 from collision_monitor.tolerances import SAT_ROUND_OFF
 

@@ -10,6 +10,7 @@ from math import inf
 from typing import Any, Final
 
 from collision_monitor._jit import inlined, outlined
+from collision_monitor.geometry.vector import Vector, along, dot, minus, opposite, rotate, sum_of_sizes
 from collision_monitor.meshes.distance.nearest import NEAR_A, triangle_at
 from collision_monitor.meshes.distance.point_range import point_range
 from collision_monitor.meshes.distance.solid import (
@@ -24,7 +25,6 @@ from collision_monitor.meshes.overlap.touching_triangles import repeats
 from collision_monitor.meshes.placing import inverse, place_point, relative
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, write
 from collision_monitor.narrow_phase.pair_pose import PairPose
-from collision_monitor.narrow_phase.vector import Vector, along, dot, minus, opposite, rotate, sum_of_sizes
 from collision_monitor.tolerances import SAT_ROUND_OFF
 
 MOST_EXAMINED: Final = 300

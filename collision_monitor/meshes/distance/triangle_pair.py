@@ -11,7 +11,7 @@ from math import inf
 from typing import Any, NamedTuple
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.narrow_phase.vector import along, cross, dot, minus, sum_of_sizes
+from collision_monitor.geometry.vector import along, cross, dot, minus, sum_of_sizes
 from collision_monitor.tolerances import SAT_ROUND_OFF, SEGMENT_PARALLEL_SIN2
 
 

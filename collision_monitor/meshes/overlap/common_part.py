@@ -6,8 +6,8 @@ from math import inf, sqrt
 from typing import Any, NamedTuple
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.vector import Vector, along, cross, direction, dot, minus, plus, scaled
 from collision_monitor.meshes.distance.triangle_pair import Corners, corner, normal
-from collision_monitor.narrow_phase.vector import Vector, along, cross, direction, dot, minus, plus, scaled
 
 
 class CommonPart(NamedTuple):

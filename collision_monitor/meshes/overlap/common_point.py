@@ -10,13 +10,13 @@ from __future__ import annotations
 from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.vector import Vector, along, direction, plus, scaled
 from collision_monitor.meshes.distance.nearest import PAIRS, triangle_at
 from collision_monitor.meshes.layout import CLOSED, WIDTH
 from collision_monitor.meshes.overlap.common_part import common_part, is_flat, normal_of
 from collision_monitor.meshes.overlap.inside import INSIDE, OUTSIDE, is_clear, locate_in_surface
 from collision_monitor.meshes.overlap.touching_triangles import nearly_touching
 from collision_monitor.meshes.placing import Placing, inverse, place_point, place_triangle
-from collision_monitor.narrow_phase.vector import Vector, along, direction, plus, scaled
 
 MOST_TOUCHING: Final = 256
 """Most pairs of triangles that touch to take points from. More: solids with fine coplanar faces that slide past each

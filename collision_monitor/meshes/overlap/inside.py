@@ -6,13 +6,13 @@ from math import sqrt
 from typing import Any, Final
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.vector import Vector, cross, dot, minus, sum_of_sizes
 from collision_monitor.meshes.boxes import box_separations, half_of
 from collision_monitor.meshes.distance.nearest import BOUNDS, PAIRS, triangle_at
 from collision_monitor.meshes.layout import CENTER, CHILD, CLOSED, FIRST_PART, MOST_PARTS, PARTS, WIDTH
 from collision_monitor.meshes.overlap.touching_triangles import repeats
 from collision_monitor.meshes.placing import Placing, inverse, place_point, turned_back
 from collision_monitor.narrow_phase.gjk import closest_on_triangle, weighted
-from collision_monitor.narrow_phase.vector import Vector, cross, dot, minus, sum_of_sizes
 from collision_monitor.tolerances import EPSILON, SAT_ROUND_OFF
 
 OUTSIDE, UNKNOWN, INSIDE = 0, 1, 2

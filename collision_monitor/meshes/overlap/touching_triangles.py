@@ -6,6 +6,7 @@ from math import inf, sqrt
 from typing import Any, Final
 
 from collision_monitor._jit import device, inlined, kernel
+from collision_monitor.geometry.vector import Vector, along, cross, dot, minus
 from collision_monitor.meshes.boxes import box_separations, triangle_bounds
 from collision_monitor.meshes.distance.nearest import (
     BOUNDS,
@@ -22,7 +23,6 @@ from collision_monitor.meshes.distance.triangle_pair import Corners, closest_tri
 from collision_monitor.meshes.layout import CHILD, FACE, RADIUS, WIDTH
 from collision_monitor.meshes.overlap.leaf_planes import may_cross, may_touch
 from collision_monitor.meshes.placing import inverse, place_triangle, relative
-from collision_monitor.narrow_phase.vector import Vector, along, cross, dot, minus
 from collision_monitor.tolerances import PARALLEL_SIN2
 
 NOWHERE: Final = (0.0, 0.0, 0.0)

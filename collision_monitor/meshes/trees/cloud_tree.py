@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import allocating_kernel, device, inlined, kernel
+from collision_monitor.geometry.vector import minus
 from collision_monitor.meshes.layout import (
     AXES,
     BOXES,
@@ -31,7 +32,6 @@ from collision_monitor.meshes.layout import (
 )
 from collision_monitor.meshes.supports import REACHES, extend, extend_by_box, write_supports
 from collision_monitor.meshes.trees.box_fit import CONTAINED
-from collision_monitor.narrow_phase.vector import minus
 
 Array = NDArray[np.float64]
 

@@ -13,6 +13,7 @@ from math import sqrt
 from typing import Final
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.vector import dot, opposite, rotate_back
 from collision_monitor.impact.body_contact import (
     RESULT,
     SHAPE_I,
@@ -37,7 +38,6 @@ from collision_monitor.motion.bodies import place_shape
 from collision_monitor.motion.motion import rotation_now
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.pair_pose import PairPose
-from collision_monitor.narrow_phase.vector import dot, opposite, rotate_back
 
 PLACE_I: Final = RESULT + 11
 PLACE_J: Final = RESULT + 12

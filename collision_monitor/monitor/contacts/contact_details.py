@@ -9,6 +9,16 @@ from math import inf, sqrt
 from typing import Any, Final
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.vector import (
+    Vector,
+    along,
+    dot,
+    minus,
+    opposite,
+    plus,
+    rotate_back,
+    sum_of_sizes,
+)
 from collision_monitor.impact.body_contact import SHAPE_I, SHAPE_J, STATUS, TOUCHING, relative_now
 from collision_monitor.impact.mesh_pair import has_mesh
 from collision_monitor.meshes.distance.feature import (
@@ -42,16 +52,6 @@ from collision_monitor.narrow_phase.contact_row import (
 from collision_monitor.narrow_phase.core import Core, CorePair, core_length, core_of, rounding
 from collision_monitor.narrow_phase.gjk import EXACT, gjk, simplex_point
 from collision_monitor.narrow_phase.support_value import core_support
-from collision_monitor.narrow_phase.vector import (
-    Vector,
-    along,
-    dot,
-    minus,
-    opposite,
-    plus,
-    rotate_back,
-    sum_of_sizes,
-)
 from collision_monitor.narrow_phase.work_memory import P_AB, R_AB
 from collision_monitor.shapes.shape_table import (
     BOX,

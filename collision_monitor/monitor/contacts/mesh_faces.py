@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.errors import InputError
+from collision_monitor.geometry.vector import Vector, opposite, plus, rotate_back
 from collision_monitor.impact.body_contact import SHAPE_I, SHAPE_J
 from collision_monitor.meshes.distance.feature import IN_FACE, feature_in_triangle, off_triangle, slot_tie
 from collision_monitor.meshes.distance.triangle_pair import Corners
@@ -32,7 +33,6 @@ from collision_monitor.narrow_phase.contact_row import (
     POINT_B,
     UNKNOWN,
 )
-from collision_monitor.narrow_phase.vector import Vector, opposite, plus, rotate_back
 from collision_monitor.objects.closed_parts import separated
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import Any
 
 from collision_monitor._jit import inlined
+from collision_monitor.geometry.vector import opposite
 from collision_monitor.impact.body_contact import (
     SHAPE_I,
     SHAPE_J,
@@ -28,7 +29,6 @@ from collision_monitor.narrow_phase.core import half_extents
 from collision_monitor.narrow_phase.dispatch import mirror
 from collision_monitor.narrow_phase.pair_pose import PairPose, swapped
 from collision_monitor.narrow_phase.sphere_sphere import sphere_sphere_contact
-from collision_monitor.narrow_phase.vector import opposite
 from collision_monitor.shapes.shape_table import SPHERE
 from collision_monitor.tolerances import FACE_PREFERENCE, SAT_ROUND_OFF
 

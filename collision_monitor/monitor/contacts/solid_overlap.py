@@ -11,6 +11,7 @@ from math import inf
 from typing import Any
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.vector import dot, opposite, rotate_back
 from collision_monitor.impact.body_contact import (
     SHAPE_I,
     SHAPE_J,
@@ -38,7 +39,6 @@ from collision_monitor.narrow_phase.core import rounding
 from collision_monitor.narrow_phase.dispatch import mirror
 from collision_monitor.narrow_phase.pair_pose import PairPose, swapped
 from collision_monitor.narrow_phase.support_value import core_support
-from collision_monitor.narrow_phase.vector import dot, opposite, rotate_back
 from collision_monitor.shapes.shape_table import HALF_SPACE
 
 

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from collision_monitor._jit import allocating_kernel, device, inlined
 from collision_monitor.errors import InputError
-from collision_monitor.narrow_phase.vector import cross, dot
+from collision_monitor.geometry.vector import cross, dot
 from collision_monitor.query.arguments import finite_number, whole_number
 from collision_monitor.tolerances import EPSILON, LARGEST_INPUT
 

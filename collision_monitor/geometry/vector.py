@@ -1,4 +1,4 @@
-"""Arithmetic of the pair tests for vectors of three numbers, which are tuples."""
+"""Arithmetic of kernels for vectors of three numbers, which are tuples."""
 
 from __future__ import annotations
 
