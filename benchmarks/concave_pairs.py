@@ -37,8 +37,8 @@ import collision_monitor as cm
 from collision_monitor.cli.output.progress import progress_bar
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
 from collision_monitor.narrow_phase.dispatch import contact_batch
+from collision_monitor.shapes.registry import Shape
 from collision_monitor.shapes.shape_table import ShapeTableBuilder, take
-from collision_monitor.shapes.shapes import Shape
 
 SHAPES = 20
 """Number of different objects of each kind."""

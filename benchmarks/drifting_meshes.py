@@ -15,7 +15,7 @@ import trimesh
 from collision_monitor.accuracy.inputs import Workload
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.shapes.pose import from_rotation_vector, multiply
-from collision_monitor.shapes.shapes import Box, Cone, ConvexHull, Cylinder, Ellipsoid, Mesh, Shape, Sphere
+from collision_monitor.shapes.registry import Box, Cone, ConvexHull, Cylinder, Ellipsoid, Mesh, Shape, Sphere
 from collision_monitor.world.arm import lathe, link
 from collision_monitor.world.scene import state_array
 

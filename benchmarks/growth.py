@@ -34,7 +34,7 @@ from collision_monitor.pipeline.topics import Topic
 from collision_monitor.ros.domain import free_domain
 from collision_monitor.ros.process import ros_context, stay_on_this_machine
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import ConvexHull, Sphere
+from collision_monitor.shapes.registry import ConvexHull, Sphere
 
 LONGEST: Final = 30.0
 """s that one attack may take; then the rest of its messages is left out."""

@@ -209,7 +209,7 @@ def describe(nodes: Nodes) -> None:
     """Describe robots and people."""
     from collision_monitor.codec import encode_descriptions
     from collision_monitor.objects.description import ObjectDescription
-    from collision_monitor.shapes.shapes import Cylinder
+    from collision_monitor.shapes.registry import Cylinder
 
     robots = [ObjectDescription(k, Cylinder(ROBOT, 1.0), name=f"robot_{k}") for k in range(ROBOTS)]
     people = [ObjectDescription(ROBOTS + k, Cylinder(PERSON, 1.75), name=f"person_{k}") for k in range(ROBOTS)]

@@ -19,7 +19,7 @@ from profile_turns import median_ratio
 
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.records import STATE
-from collision_monitor.shapes.shapes import Box, Circle, Cylinder, Polygon, Shape
+from collision_monitor.shapes.registry import Box, Circle, Cylinder, Polygon, Shape
 
 RATE, HEIGHT, TURNS = 20.0, 2.0, 0.5
 Pair = tuple[int, int]

@@ -35,7 +35,7 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session import Recorder, Session
 from collision_monitor.session.replaying.replay import replay
-from collision_monitor.shapes.shapes import Box
+from collision_monitor.shapes.registry import Box
 
 NODE = "/object_monitor"
 TYPES = {

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from collision_monitor.cli.output.progress import progress_bar
 from collision_monitor.report.footprint import footprint
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, Sphere
+from collision_monitor.shapes.registry import Box, Sphere
 from collision_monitor.world import make_scene
 from collision_monitor.world.pendulums import Pendulums
 from collision_monitor.world.rigid.impulse_response import ImpulseResponse

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.settings.profile import Profile
-from collision_monitor.shapes.shapes import Box, Circle, Mesh, Sphere
+from collision_monitor.shapes.registry import Box, Circle, Mesh, Sphere
 from collision_monitor.world import make_scene
 from collision_monitor.world.scene import state_array
 

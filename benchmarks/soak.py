@@ -39,7 +39,7 @@ from collision_monitor.pipeline.settings_event import encode_settings
 from collision_monitor.records import STATE, Phase
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Mesh, Shape, Sphere
+from collision_monitor.shapes.registry import Box, Capsule, Cone, ConvexHull, Cylinder, Mesh, Shape, Sphere
 from collision_monitor.warm_up import warm_up_monitor
 
 RATE: Final = 10

@@ -33,7 +33,7 @@ from collision_monitor.objects.models import containing_model
 from collision_monitor.records import PredictionStatus
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose, from_rotation_vector, multiply, rotation_matrix
-from collision_monitor.shapes.shapes import Box, Capsule, Cylinder, Shape, Sphere
+from collision_monitor.shapes.registry import Box, Capsule, Cylinder, Shape, Sphere
 
 NOISE = 0.005
 MOST_PAIRS = 2_000

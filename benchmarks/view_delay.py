@@ -26,7 +26,7 @@ from browser import Browser  # noqa: E402
 from collision_monitor import records  # noqa: E402
 from collision_monitor.codec import encode_contacts, encode_descriptions, encode_predictions, encode_states  # noqa: E402
 from collision_monitor.objects.description import ObjectDescription  # noqa: E402
-from collision_monitor.shapes.shapes import Box, Capsule, Sphere  # noqa: E402
+from collision_monitor.shapes.registry import Box, Capsule, Sphere  # noqa: E402
 from collision_monitor.view.server import start_server, stop_server  # noqa: E402
 from collision_monitor.view.topic_content import TopicContent  # noqa: E402
 from collision_monitor.view.view import View  # noqa: E402

@@ -2,20 +2,20 @@
 
     monitor.monitor                Monitor, StepResult, StepStatus        states in, contacts and predictions out
     settings.profile               Profile                                the settings that trade speed for accuracy
-    geometry.shapes, .pose         Sphere, Box, …, Pose, Motion           shapes of objects, and their poses
-    geometry.mesh_file             load_mesh                              a mesh from a file
+    shapes.kinds, shapes.pose      Sphere, Box, …, Pose, Motion           shapes of objects, and their poses
+    shapes.mesh_file               load_mesh                              a mesh from a file
     objects.description            ObjectDescription                      an object with its shapes, group and bounds
     objects.convex_decomposition   convex_decomposition, Decomposition    a concave mesh as convex parts, with an error
-    query.contact                  contact, Contact                       two shapes: distance, normal, points, bound
-    query.features                 contact_features                       features: "vertex 3 of A on face 7 of B"
-    query.overlap                  overlap                                yes or no, with a choice of tests
-    query.containment              contains                              which points are in a shape
-    query.rays                     cast_ray, RayHits                     where rays and segments meet a shape
-    query.points_within            points_within                         which points of a cloud are near a shape
-    query.kdop                     kdop, Enclosure                       bounding slabs with directions of your own
-    query.time_of_impact           time_of_impact, Impact                 time of impact of two shapes, as an interval
-    query.time_of_impact_batch     time_of_impact_batch, Impacts          the same for many motions of two shapes
-    query.feature_impact           vertex_face_impact, edge_edge_impact   the same for features in linear motion
+    query.contact.contact          contact, Contact                       two shapes: distance, normal, points, bound
+    query.contact.features         contact_features                       features: "vertex 3 of A on face 7 of B"
+    query.contact.overlap          overlap                                yes or no, with a choice of tests
+    query.points.containment       contains                              which points are in a shape
+    query.points.rays              cast_ray, RayHits                     where rays and segments meet a shape
+    query.points.points_within     points_within                         which points of a cloud are near a shape
+    query.points.kdop              kdop, Enclosure                       bounding slabs with directions of your own
+    query.impact.time_of_impact    time_of_impact, Impact                 time of impact of two shapes, as an interval
+    query.impact.time_of_impact_batch time_of_impact_batch, Impacts          the same for many motions of two shapes
+    query.impact.feature_impact    vertex_face_impact, edge_edge_impact   the same for features in linear motion
     response                       response.collide, reflect, …           what bodies do when they meet, for simulations
     records                        Model                                  the geometric models of an object
     errors                         CollisionMonitorError and subclasses   errors of the inputs
@@ -29,6 +29,7 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from collision_monitor._version import VERSION as __version__  # noqa: N811
@@ -42,18 +43,6 @@ _HOME = {
     "Model": "records",
     "Pose": "shapes.pose",
     "Motion": "shapes.pose",
-    "Sphere": "shapes.shapes",
-    "Box": "shapes.shapes",
-    "Capsule": "shapes.shapes",
-    "Cylinder": "shapes.shapes",
-    "Cone": "shapes.shapes",
-    "Ellipsoid": "shapes.shapes",
-    "ConvexHull": "shapes.shapes",
-    "Mesh": "shapes.shapes",
-    "Points": "shapes.shapes",
-    "HalfSpace": "shapes.shapes",
-    "Circle": "shapes.shapes",
-    "Polygon": "shapes.shapes",
     "load_mesh": "shapes.mesh_file",
     "contact": "query.contact.contact",
     "Contact": "query.contact.contact",
@@ -89,6 +78,10 @@ _HOME = {
     "SessionError": "errors",
     "Refusal": "errors",
     "RefusalWarning": "errors",
+}
+_HOME |= {  # the shapes: kinds/truncated_cone.py has the class TruncatedCone
+    file.stem.title().replace("_", ""): f"shapes.kinds.{file.stem}"
+    for file in sorted((Path(__file__).parent / "shapes" / "kinds").glob("[a-z]*.py"))
 }
 _MODULES = ("response", "world")
 __all__ = ["__version__", *_MODULES, *_HOME]
@@ -139,18 +132,7 @@ if TYPE_CHECKING:
     from collision_monitor.shapes.mesh_file import load_mesh as load_mesh
     from collision_monitor.shapes.pose import Motion as Motion
     from collision_monitor.shapes.pose import Pose as Pose
-    from collision_monitor.shapes.shapes import Box as Box
-    from collision_monitor.shapes.shapes import Capsule as Capsule
-    from collision_monitor.shapes.shapes import Circle as Circle
-    from collision_monitor.shapes.shapes import Cone as Cone
-    from collision_monitor.shapes.shapes import ConvexHull as ConvexHull
-    from collision_monitor.shapes.shapes import Cylinder as Cylinder
-    from collision_monitor.shapes.shapes import Ellipsoid as Ellipsoid
-    from collision_monitor.shapes.shapes import HalfSpace as HalfSpace
-    from collision_monitor.shapes.shapes import Mesh as Mesh
-    from collision_monitor.shapes.shapes import Points as Points
-    from collision_monitor.shapes.shapes import Polygon as Polygon
-    from collision_monitor.shapes.shapes import Sphere as Sphere
+    from collision_monitor.shapes.registry import *  # noqa: F403
 
 
 def __getattr__(name: str) -> Any:

@@ -22,7 +22,7 @@ from collision_monitor.objects.models import containing_model
 from collision_monitor.records import MOST_POINTS, STATE, Model
 from collision_monitor.settings.profile import NO_BUDGET, NO_LIMIT, Profile
 from collision_monitor.shapes.pose import Motion, Pose
-from collision_monitor.shapes.shapes import Box, ConvexHull, Cylinder, Mesh, Points, Shape, Sphere
+from collision_monitor.shapes.registry import Box, ConvexHull, Cylinder, Mesh, Points, Shape, Sphere
 
 Array = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from collision_monitor import Cylinder, Monitor, Pose
 from collision_monitor.robots.robot import Description, Robot, make_robot
-from collision_monitor.shapes.shapes import Shape
+from collision_monitor.shapes.registry import Shape
 
 ROOT = Path(__file__).parents[1]
 SWING = (-0.2, 0.2, 0.62)  # rad of joint_1, one picture each

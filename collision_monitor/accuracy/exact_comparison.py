@@ -16,7 +16,7 @@ from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.query.contact.contact import contact
 from collision_monitor.query.impact.time_of_impact import time_of_impact
 from collision_monitor.shapes.pose import Motion, Pose
-from collision_monitor.shapes.shapes import Box, Capsule, Sphere
+from collision_monitor.shapes.registry import Box, Capsule, Sphere
 
 Rng = np.random.Generator
 Floats = NDArray[np.float64]

@@ -12,7 +12,7 @@ from collision_monitor.codec.shape_fields import LEAST_SHAPE, make_shape, read_s
 from collision_monitor.errors import InputError, ShapeError, reason_of
 from collision_monitor.objects.description import MOST_SHAPES, ObjectDescription
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Sphere
+from collision_monitor.shapes.registry import Sphere
 
 _ADD, _REMOVE = 0, 1
 _IDENTITY = Pose()

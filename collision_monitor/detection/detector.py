@@ -19,9 +19,11 @@ from collision_monitor.broad_phase.dense_grid import classify_bodies, make_grid
 from collision_monitor.detection import kernels
 from collision_monitor.detection.partitioned import check_broad_phase, detect_with
 from collision_monitor.errors import InputError, PoseError, UnsupportedError
+from collision_monitor.shapes.kinds.box import BOX
+from collision_monitor.shapes.kinds.sphere import SPHERE
 from collision_monitor.shapes.planar import is_planar
-from collision_monitor.shapes.shape_table import BOX, SPHERE, ShapeTableBuilder
-from collision_monitor.shapes.shapes import Shape
+from collision_monitor.shapes.registry import Shape
+from collision_monitor.shapes.shape_table import ShapeTableBuilder
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 
 Array = NDArray[np.float64]

@@ -19,9 +19,9 @@ from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.vector import cross, dot
-from collision_monitor.narrow_phase.core import core_box, is_centred_box, rounding
-from collision_monitor.narrow_phase.support_value import core_support
-from collision_monitor.shapes.shape_table import SPHERE
+from collision_monitor.narrow_phase.core import rounding
+from collision_monitor.shapes.calls import core_box, core_support, is_centred_box
+from collision_monitor.shapes.kinds.sphere import SPHERE
 from collision_monitor.tolerances import EPSILON
 
 PIECES: Final = 8

@@ -34,7 +34,7 @@ from collision_monitor.impact.sphere_interval import meeting_of_spheres, relativ
 from collision_monitor.meshes.overlap.inside import OUTSIDE
 from collision_monitor.motion.motion import half_acceleration, relative_position, relative_velocity
 from collision_monitor.narrow_phase.contact_row import NORMAL, POINT_A, POINT_B
-from collision_monitor.shapes.shape_table import HALF_SPACE
+from collision_monitor.shapes.kinds.half_space import HALF_SPACE
 
 TRIES: Final = (1.5, 4.0)
 """Times after the lower end at which triangles may meet: those in which the bodies move by so many gaps."""

@@ -13,7 +13,6 @@ from collision_monitor.impact.tree_impact import HEAP, pop_first, push_pair, tim
 from collision_monitor.meshes.boxes import half_of
 from collision_monitor.meshes.distance.contact import reach_in
 from collision_monitor.meshes.distance.nearest import BOUNDS, PAIRS, size_of
-from collision_monitor.meshes.distance.point_range import point_range
 from collision_monitor.meshes.distance.solid import (
     MovingSolid,
     SolidMemory,
@@ -30,6 +29,7 @@ from collision_monitor.narrow_phase.contact_row import BOUND, POINT_A, POINT_B
 from collision_monitor.narrow_phase.core import core_length
 from collision_monitor.narrow_phase.dispatch import mirror
 from collision_monitor.narrow_phase.pair_pose import PairPose, swapped
+from collision_monitor.shapes.calls import point_distance_range
 
 
 @device
@@ -37,7 +37,7 @@ def _box_time(blocks, block, k, solid):
     """`box_time` along a direction that is better for cones and ellipsoids."""
     table, b, _, X, move = solid
     c, e = center_of(blocks, block, k), half_of(blocks, block, k)
-    lower, _, n = point_range(table, b, place_point(inverse(X), c))
+    lower, _, n = point_distance_range(table, b, place_point(inverse(X), c))
     n = minus((X.x, X.y, X.z), place_point(X, n))
     gap, turn = lower - box_reach_along(blocks, block, k, n), box_reach_along(blocks, block, k, cross(n, move.w_a))
     return solid_time(table, b, X, n, gap - move.start, c, sqrt(dot(e, e)), turn, move)
@@ -67,7 +67,7 @@ def solid_near(table, parts, pair, now, window, tube, query, near, scratch):
         speed = sqrt(dot(move.v, move.v)) + move.growth
         speed += sqrt(move.bend_a) * reach_in(blocks, root) + sqrt(move.bend_b) * own
         gap = nearness(near, speed, t - now, query)
-        _, most, _ = point_range(table, b, place_point(inverse(X), center_of(blocks, i, k)))
+        _, most, _ = point_distance_range(table, b, place_point(inverse(X), center_of(blocks, i, k)))
         if steps > STEPS or most + box_radius(blocks, i, k) <= gap + move.start:
             return t, UNRESOLVED, gap
         soon = inf

@@ -27,12 +27,16 @@ from collision_monitor.narrow_phase.contact_row import (
     NORMAL,
     POINT_A,
     POINT_B,
-    VERTEX,
     write,
 )
 from collision_monitor.narrow_phase.dispatch import contact_within, mirror
 from collision_monitor.narrow_phase.pair_pose import swapped
-from collision_monitor.shapes.shape_table import CONVEX_HULL, HALF_SPACE, MESH, POINTS, TREE
+from collision_monitor.shapes.feature_types import VERTEX
+from collision_monitor.shapes.kinds.convex_hull import CONVEX_HULL
+from collision_monitor.shapes.kinds.half_space import HALF_SPACE
+from collision_monitor.shapes.kinds.mesh import MESH
+from collision_monitor.shapes.kinds.points import POINTS
+from collision_monitor.shapes.shape_table import TREE
 from collision_monitor.tolerances import FEATURE_TIE, SAT_ROUND_OFF
 
 

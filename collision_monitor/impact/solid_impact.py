@@ -30,7 +30,7 @@ from collision_monitor.meshes.layout import CHILD, WIDTH
 from collision_monitor.meshes.placing import relative
 from collision_monitor.narrow_phase.core import core_length
 from collision_monitor.narrow_phase.pair_pose import PairPose
-from collision_monitor.shapes.shape_table import HALF_SPACE
+from collision_monitor.shapes.kinds.half_space import HALF_SPACE
 
 EXAMINED: Final = 30
 """Steps that a triangle counts as, of the STEPS: GJK takes as long as 30 boxes. 50,000 slivers in one line need more

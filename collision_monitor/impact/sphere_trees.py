@@ -19,7 +19,8 @@ from collision_monitor.impact.body_impact import Window, tube_of
 from collision_monitor.impact.impact_record import CLEAR, TREE_BOUND
 from collision_monitor.impact.sphere_interval import meeting_of_spheres, relative_motion_at, sphere_interval
 from collision_monitor.motion.motion import half_acceleration, rotation_at
-from collision_monitor.shapes.shape_table import BOX, CONVEX_HULL
+from collision_monitor.shapes.kinds.box import BOX
+from collision_monitor.shapes.kinds.convex_hull import CONVEX_HULL
 from collision_monitor.tolerances import ROUNDED_UP
 
 Array = NDArray[np.float64]

@@ -33,7 +33,7 @@ from collision_monitor.objects.models import Modelled, monitored_model, parse_mo
 from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Shape
+from collision_monitor.shapes.registry import Shape
 
 FACTS = "monitor"
 """Key of the monitor's entry in Snapshot.facts."""

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 
 from collision_monitor.broad_phase.hashed_grid import GRID_LEVELS, LEVEL_OFFSET, HashedGrid
 from collision_monitor.monitor.state.roster import Roster
-from collision_monitor.narrow_phase.dispatch import KIND_NAMES, TEST_METHODS, pair_test
-from collision_monitor.shapes.shape_table import MESH, POINTS
+from collision_monitor.narrow_phase.dispatch import TEST_METHODS, pair_test
+from collision_monitor.shapes.kinds.mesh import MESH
+from collision_monitor.shapes.kinds.points import POINTS
+from collision_monitor.shapes.registry import KIND_NAMES
 
 _NAMES: Final = {**KIND_NAMES, MESH: "mesh", POINTS: "points"}
 _METHODS: Final = {**TEST_METHODS, "meshes": "trees of triangles or points"}

@@ -9,7 +9,9 @@ import numpy as np
 
 from collision_monitor._jit import inlined, kernel
 from collision_monitor.motion.bodies import Multibody
-from collision_monitor.shapes.shape_table import BOX, CAPSULE, CIRCLE, CONE, CYLINDER, SPHERE
+from collision_monitor.shapes.kinds.box import BOX
+from collision_monitor.shapes.kinds.sphere import SPHERE
+from collision_monitor.shapes.registry import BALL, REVOLVED
 
 
 def lay_out_body(multibody: Multibody, i: int, slots: Sequence[int], shape_of: Sequence[int]) -> None:
@@ -34,14 +36,9 @@ def _lay_out(multibody, i, slots, shape_of):
     bodies.first_shape[i] = first = slots[0]
     bodies.motion[i].radius = radius
     # rotation moves every body but a single ball about its origin
-    is_round = last == 0 and _is_ball(table.kind[first]) and not table.local_position[first].any()
+    is_round = last == 0 and BALL[table.kind[first]] and not table.local_position[first].any()
     bodies.spin_radius[i] = 0.0 if is_round else radius
     bodies.revolved[i] = revolved
-
-
-@inlined
-def _is_ball(kind):
-    return kind == SPHERE or kind == CIRCLE
 
 
 @inlined
@@ -58,7 +55,7 @@ def _is_revolved(table, s):
     """Whether a shape is a solid of revolution about an axis parallel to the z axis of its body."""
     kind = table.kind[s]
     along = abs(table.local_rotation[s, 2, 2]) == 1.0
-    return _is_ball(kind) or (along and (kind == CAPSULE or kind == CYLINDER or kind == CONE))
+    return BALL[kind] or (along and REVOLVED[kind])
 
 
 @kernel

@@ -24,20 +24,18 @@ from collision_monitor.geometry.vector import (
 )
 from collision_monitor.narrow_phase.contact_row import (
     DISTANCE,
-    EDGE,
-    FACE,
     FEATURE_TYPE_A,
     FEATURE_TYPE_B,
     NORMAL,
     POINT_A,
     POINT_B,
-    VERTEX,
     write,
 )
 from collision_monitor.narrow_phase.convex_convex import convex_contact
 from collision_monitor.narrow_phase.core import half_extents
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.segment import segment_segment
+from collision_monitor.shapes.feature_types import EDGE, FACE, VERTEX
 from collision_monitor.tolerances import FACE_PREFERENCE, FEATURE_TIE, PARALLEL_SIN2, SAT_ROUND_OFF
 
 # Sections of the scratch memory: the features, and two polygons of rows (u, v).

@@ -7,9 +7,10 @@ from typing import Any
 
 from collision_monitor._jit import inlined
 from collision_monitor.geometry.vector import across, column, cross, direction, dot, scaled
-from collision_monitor.narrow_phase.contact_row import FEATURE_TYPE_A, FEATURE_TYPE_B, SURFACE, write
+from collision_monitor.narrow_phase.contact_row import FEATURE_TYPE_A, FEATURE_TYPE_B, write
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.segment import segment_segment
+from collision_monitor.shapes.feature_types import SURFACE
 from collision_monitor.tolerances import GJK_TOUCHING, SAT_ROUND_OFF, SEGMENT_PARALLEL_SIN2
 
 

@@ -12,14 +12,15 @@ from typing import Any
 from collision_monitor._jit import inlined
 from collision_monitor.geometry.vector import along, dot, opposite, rotate
 from collision_monitor.narrow_phase.contact_row import write
-from collision_monitor.narrow_phase.core import CorePair, core_length, core_pair, core_radius, rounding
+from collision_monitor.narrow_phase.core import CorePair, core_length, core_pair, rounding
 from collision_monitor.narrow_phase.epa import epa
 from collision_monitor.narrow_phase.gjk import EXACT, Accuracy, gjk, point_on_a, simplex_point
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.parallel_axes import axes_are_parallel, parallel_axes_depth
-from collision_monitor.narrow_phase.support_point import support_difference
+from collision_monitor.narrow_phase.support_difference import support_difference
 from collision_monitor.narrow_phase.work_memory import MAX_VERTICES, P_AB, R_AB, SPARE, WEIGHTS
-from collision_monitor.shapes.shape_table import CONE, CYLINDER, ELLIPSOID
+from collision_monitor.shapes.calls import core_radius
+from collision_monitor.shapes.registry import CURVED
 from collision_monitor.tolerances import EPA_CURVED, EPA_CURVED_POINTS, EPA_POLYTOPE, GJK_TOUCHING, SAT_ROUND_OFF
 
 
@@ -32,12 +33,6 @@ def _place(pose: PairPose, work: Any) -> None:
         for j in range(3):
             work[R_AB + 3 * i + j] = RA[0, i] * RB[0, j] + RA[1, i] * RB[1, j] + RA[2, i] * RB[2, j]
         work[P_AB + i] = RA[0, i] * px + RA[1, i] * py + RA[2, i] * pz
-
-
-@inlined
-def _is_curved(kind: int) -> bool:
-    """Whether a core has a round surface, which EPA approximates."""
-    return kind == CYLINDER or kind == CONE or kind == ELLIPSOID
 
 
 @inlined
@@ -73,7 +68,7 @@ def cores_contact(
     count, lower, normal = gjk(cores, work, size, limit + ra + rb, EXACT)
     if count == 0:
         return False
-    curved = _is_curved(A.kind) or _is_curved(B.kind)
+    curved = CURVED[A.kind] or CURVED[B.kind]
     if lower > 0.0:
         # the length of a point of B - A: an upper bound even if the simplex is too thin for its own length to be one
         w = point_a = (0.0, 0.0, 0.0)

@@ -1,7 +1,4 @@
-"""The core of a shape: the shape without the radius that rounds it, which GJK and EPA work on.
-
-A core is a point for a sphere, a segment for a capsule, else the shape itself.
-"""
+"""The core of a shape: the shape without the radius that rounds it, which GJK and EPA work on (see shapes/calls.py)."""
 
 from __future__ import annotations
 
@@ -9,7 +6,7 @@ from typing import Any, NamedTuple
 
 from collision_monitor._jit import inlined
 from collision_monitor.geometry.vector import Vector
-from collision_monitor.shapes.shape_table import BOX, CAPSULE, SPHERE
+from collision_monitor.shapes.calls import core_radius
 
 
 class Core(NamedTuple):
@@ -48,13 +45,6 @@ def core_pair(table: Any, a: int, b: int) -> CorePair:
 
 
 @inlined
-def core_radius(table: Any, slot: int) -> float:
-    """Radius (m) by which the core of a shape without margin is grown: 0 except for spheres and capsules."""
-    kind = table.kind[slot]
-    return table.size[slot, 0] if kind == SPHERE or kind == CAPSULE else 0.0
-
-
-@inlined
 def rounding(table: Any, slot: int) -> float:
     """Radius (m) of the sphere that rounds the core, margin included."""
     return core_radius(table, slot) + table.margin[slot]
@@ -64,19 +54,3 @@ def rounding(table: Any, slot: int) -> float:
 def core_length(table: Any, slot: int) -> float:
     """Scale (m) of the round-off of a core."""
     return table.radius[slot] - table.margin[slot]
-
-
-@inlined
-def is_centred_box(kind: int) -> bool:
-    """Whether the core is a box about its origin: a segment for a capsule, a point for a sphere."""
-    return kind == BOX or kind == CAPSULE or kind == SPHERE
-
-
-@inlined
-def core_box(table: Any, slot: int) -> Vector:
-    """Half extents (m) of a core that is a box about its origin."""
-    if table.kind[slot] == BOX:
-        return half_extents(table, slot)
-    if table.kind[slot] == CAPSULE:
-        return 0.0, 0.0, table.size[slot, 1]
-    return 0.0, 0.0, 0.0

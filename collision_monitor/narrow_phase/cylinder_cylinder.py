@@ -11,10 +11,12 @@ from typing import Any
 
 from collision_monitor._jit import inlined
 from collision_monitor.geometry.vector import Vector, across, along, column, cross, dot, scaled
-from collision_monitor.narrow_phase.contact_row import FEATURE_TYPE_A, SURFACE, write
+from collision_monitor.narrow_phase.contact_row import FEATURE_TYPE_A, write
 from collision_monitor.narrow_phase.core import rounding
 from collision_monitor.narrow_phase.pair_pose import PairPose
-from collision_monitor.shapes.shape_table import CYLINDER, SPHERE
+from collision_monitor.shapes.feature_types import SURFACE
+from collision_monitor.shapes.kinds.cylinder import CYLINDER
+from collision_monitor.shapes.kinds.sphere import SPHERE
 from collision_monitor.tolerances import SAT_ROUND_OFF, SEGMENT_PARALLEL_SIN2
 
 

@@ -37,31 +37,15 @@ from collision_monitor.narrow_phase.sphere_box import sphere_box_contact, sphere
 from collision_monitor.narrow_phase.sphere_cone import sphere_cone_contact
 from collision_monitor.narrow_phase.sphere_sphere import sphere_sphere_contact, sphere_sphere_separation
 from collision_monitor.narrow_phase.work_memory import WORK_SIZE
-from collision_monitor.shapes.shape_table import (
-    BOX,
-    CAPSULE,
-    CIRCLE,
-    CONE,
-    CONVEX_HULL,
-    CYLINDER,
-    ELLIPSOID,
-    HALF_SPACE,
-    POLYGON,
-    SPHERE,
-)
-
-KIND_NAMES: Final = {
-    SPHERE: "sphere",
-    BOX: "box",
-    CAPSULE: "capsule",
-    CYLINDER: "cylinder",
-    CONE: "cone",
-    CONVEX_HULL: "convex hull",
-    HALF_SPACE: "half-space",
-    CIRCLE: "circle",
-    POLYGON: "polygon",
-    ELLIPSOID: "ellipsoid",
-}
+from collision_monitor.shapes.kinds.box import BOX
+from collision_monitor.shapes.kinds.capsule import CAPSULE
+from collision_monitor.shapes.kinds.circle import CIRCLE
+from collision_monitor.shapes.kinds.cone import CONE
+from collision_monitor.shapes.kinds.cylinder import CYLINDER
+from collision_monitor.shapes.kinds.half_space import HALF_SPACE
+from collision_monitor.shapes.kinds.polygon import POLYGON
+from collision_monitor.shapes.kinds.sphere import SPHERE
+from collision_monitor.shapes.registry import CURVED
 
 TEST_METHODS: Final = {
     "sphere_sphere": "centres",
@@ -94,46 +78,21 @@ PAIR_TESTS: Final = {
     (SPHERE, CAPSULE): CAPSULE_CAPSULE,
     (SPHERE, CYLINDER): CYLINDER_CYLINDER,
     (SPHERE, CONE): SPHERE_CONE,
-    (SPHERE, CONVEX_HULL): CONVEX_CONVEX,
-    (SPHERE, HALF_SPACE): HALF_SPACE_ANY,
     (BOX, BOX): BOX_BOX,
-    (BOX, CAPSULE): CONVEX_CONVEX,
-    (BOX, CYLINDER): CONVEX_CONVEX,
-    (BOX, CONE): CONVEX_CONVEX,
-    (BOX, CONVEX_HULL): CONVEX_CONVEX,
-    (BOX, HALF_SPACE): HALF_SPACE_ANY,
     (CAPSULE, CAPSULE): CAPSULE_CAPSULE,
     (CAPSULE, CYLINDER): CYLINDER_CYLINDER,
-    (CAPSULE, CONE): CONVEX_CONVEX,
-    (CAPSULE, CONVEX_HULL): CONVEX_CONVEX,
-    (CAPSULE, HALF_SPACE): HALF_SPACE_ANY,
     (CYLINDER, CYLINDER): CYLINDER_CYLINDER,
-    (CYLINDER, CONE): CONVEX_CONVEX,
-    (CYLINDER, CONVEX_HULL): CONVEX_CONVEX,
-    (CYLINDER, HALF_SPACE): HALF_SPACE_ANY,
-    (CONE, CONE): CONVEX_CONVEX,
-    (CONE, CONVEX_HULL): CONVEX_CONVEX,
-    (CONE, HALF_SPACE): HALF_SPACE_ANY,
-    (CONVEX_HULL, CONVEX_HULL): CONVEX_CONVEX,
-    (CONVEX_HULL, HALF_SPACE): HALF_SPACE_ANY,
-    (HALF_SPACE, HALF_SPACE): HALF_SPACE_ANY,
-    (SPHERE, ELLIPSOID): CONVEX_CONVEX,
-    (BOX, ELLIPSOID): CONVEX_CONVEX,
-    (CAPSULE, ELLIPSOID): CONVEX_CONVEX,
-    (CYLINDER, ELLIPSOID): CONVEX_CONVEX,
-    (CONE, ELLIPSOID): CONVEX_CONVEX,
-    (CONVEX_HULL, ELLIPSOID): CONVEX_CONVEX,
-    (ELLIPSOID, ELLIPSOID): CONVEX_CONVEX,
-    (ELLIPSOID, HALF_SPACE): HALF_SPACE_ANY,
     (CIRCLE, CIRCLE): POLYGON_POLYGON,
     (CIRCLE, POLYGON): POLYGON_POLYGON,
     (POLYGON, POLYGON): POLYGON_POLYGON,
 }
-"""Test of each pair of kinds, the smaller kind first, a half-space last. Plane shapes and solids are never paired."""
+"""Pairs of kinds with a test of their own, the smaller kind first. Any solid and a half-space have HALF_SPACE_ANY, all
+other solids CONVEX_CONVEX. Plane shapes and solids are never paired."""
 
-_TEST_OF: Final = np.full((ELLIPSOID + 1, ELLIPSOID + 1), CONVEX_CONVEX, np.uint8)
-"""PAIR_TESTS for the kernels: a row for each kind of A, a column for each kind of B."""
+_TEST_OF: Final = np.full((len(CURVED), len(CURVED)), CONVEX_CONVEX, np.uint8)
+"""The test for the kernels: a row for each kind of A, a column for each kind of B."""
 
+_TEST_OF[:, HALF_SPACE] = HALF_SPACE_ANY
 for _kinds, _test in PAIR_TESTS.items():
     _TEST_OF[_kinds] = _test
 

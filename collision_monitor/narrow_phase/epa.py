@@ -13,7 +13,7 @@ from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.geometry.vector import Vector, across, along, cross, dot, minus, opposite, scaled
 from collision_monitor.narrow_phase.core import CorePair
 from collision_monitor.narrow_phase.gjk import closest_on_triangle, point_on_a, simplex_point, weighted
-from collision_monitor.narrow_phase.support_point import support_difference
+from collision_monitor.narrow_phase.support_difference import support_difference
 from collision_monitor.narrow_phase.work_memory import (
     EDGES,
     FACES,

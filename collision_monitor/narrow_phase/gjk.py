@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.vector import Vector, along, cross, direction, dot, minus, opposite, scaled
 from collision_monitor.narrow_phase.core import CorePair
-from collision_monitor.narrow_phase.support_point import support_difference
+from collision_monitor.narrow_phase.support_difference import support_difference
 from collision_monitor.narrow_phase.work_memory import NEW_WEIGHTS, ON_A, P_AB, SIMPLEX, SIMPLEX_ROW, WEIGHTS
 from collision_monitor.tolerances import EPSILON, FLAT, GJK_RELATIVE, GJK_TOUCHING, THIN_SIN2
 

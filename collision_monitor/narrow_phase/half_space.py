@@ -18,10 +18,11 @@ from collision_monitor.geometry.vector import (
     scaled,
     sum_of_sizes,
 )
-from collision_monitor.narrow_phase.contact_row import DISTANCE, FACE, FEATURE_TYPE_A, FEATURE_TYPE_B, write
+from collision_monitor.narrow_phase.contact_row import DISTANCE, FEATURE_TYPE_A, FEATURE_TYPE_B, write
 from collision_monitor.narrow_phase.core import core_of, rounding
 from collision_monitor.narrow_phase.pair_pose import PairPose
-from collision_monitor.narrow_phase.support_point import support_point
+from collision_monitor.shapes.calls import support_point
+from collision_monitor.shapes.feature_types import FACE
 from collision_monitor.tolerances import OPPOSED, SAT_ROUND_OFF
 
 
@@ -40,7 +41,8 @@ def half_space_contact(table: Any, a: int, b: int, pose: PairPose, out: Any) -> 
     offset = table.size[b, 3]
     n = _normal(table, b, pose.R_B)
     d = opposite(rotate_back(pose.R_A, n))
-    own = support_point(core_of(table, a), table.vertices, d)
+    core = core_of(table, a)
+    own = support_point(core.kind, core.size, table.vertices, core.first, core.count, d)
     own = along(own, rounding(table, a), d)
     witness = rotate(pose.R_A, own)
     distance = dot(n, minus(witness, pose.p)) - (offset + table.margin[b])

@@ -19,7 +19,10 @@ from collision_monitor.narrow_phase.contact_row import DISTANCE, NORMAL, POINT_A
 from collision_monitor.narrow_phase.pair_pose import PairPose, pair_pose
 from collision_monitor.narrow_phase.work_memory import work_array
 from collision_monitor.records import MOST_POINTS
-from collision_monitor.shapes.shape_table import BOX, CONVEX_HULL, HALF_SPACE, POLYGON
+from collision_monitor.shapes.kinds.box import BOX
+from collision_monitor.shapes.kinds.convex_hull import CONVEX_HULL
+from collision_monitor.shapes.kinds.half_space import HALF_SPACE
+from collision_monitor.shapes.kinds.polygon import POLYGON
 from collision_monitor.tolerances import EPSILON, FEATURE_TIE, GJK_TOUCHING, SAT_ROUND_OFF
 
 CORNERS: Final = 512

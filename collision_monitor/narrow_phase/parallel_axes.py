@@ -14,32 +14,19 @@ from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.vector import Vector
 from collision_monitor.narrow_phase.core import Core
 from collision_monitor.narrow_phase.work_memory import P_AB, R_AB
-from collision_monitor.shapes.shape_table import CAPSULE, CONE, CYLINDER, SPHERE
+from collision_monitor.shapes.calls import revolved_profile
+from collision_monitor.shapes.kinds.sphere import SPHERE
+from collision_monitor.shapes.registry import REVOLVED
 from collision_monitor.tolerances import FEATURE_TIE, SEGMENT_PARALLEL_SIN2
-
-
-@inlined
-def _is_of_revolution(core: Core) -> bool:
-    return core.kind == CONE or core.kind == CYLINDER or core.kind == CAPSULE or core.kind == SPHERE
 
 
 @inlined
 def axes_are_parallel(A: Core, B: Core, work: Any) -> bool:
     """Whether both cores are solids of revolution with parallel axes; B's is the last column of R_AB in work."""
-    if not _is_of_revolution(B) or not _is_of_revolution(A):
+    if not REVOLVED[B.kind] or not REVOLVED[A.kind]:
         return False
     x, y = work[R_AB + 2], work[R_AB + 5]
     return A.kind == SPHERE or B.kind == SPHERE or x * x + y * y <= SEGMENT_PARALLEL_SIN2
-
-
-@inlined
-def _profile(core: Core) -> tuple[float, float, float]:
-    """Half widths of the profile at the top and at the bottom, and its half height (m)."""
-    if core.kind == CYLINDER:
-        return core.size[0], core.size[0], core.size[1]
-    if core.kind == CONE:
-        return 0.0, core.size[0], core.size[1]
-    return 0.0, 0.0, core.size[1] if core.kind == CAPSULE else 0.0
 
 
 @device
@@ -72,8 +59,8 @@ def parallel_axes_depth(A: Core, B: Core, work: Any, size: float) -> tuple[float
     The results are in A's frame, and so is the pose of B in work. The witness point of touching faces is the middle of
     their common part.
     """
-    top_a, bottom_a, half_a = _profile(A)
-    top_b, bottom_b, half_b = _profile(B)
+    top_a, bottom_a, half_a = revolved_profile(A.kind, A.size)
+    top_b, bottom_b, half_b = revolved_profile(B.kind, B.size)
     x, y, height = work[P_AB], work[P_AB + 1], work[P_AB + 2]
     reach = sqrt(x * x + y * y)
     if reach > 0.0:

@@ -12,7 +12,7 @@ from typing import Any
 from collision_monitor._jit import device
 from collision_monitor.narrow_phase.contact_row import write
 from collision_monitor.narrow_phase.pair_pose import PairPose, swapped
-from collision_monitor.shapes.shape_table import CIRCLE
+from collision_monitor.shapes.kinds.circle import CIRCLE
 from collision_monitor.tolerances import FEATURE_TIE, SAT_ROUND_OFF
 
 

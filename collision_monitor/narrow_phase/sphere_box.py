@@ -15,16 +15,8 @@ from collision_monitor.geometry.vector import (
     scaled,
     sum_of_sizes,
 )
-from collision_monitor.narrow_phase.contact_row import (
-    EDGE,
-    FACE,
-    FEATURE_INDEX_B,
-    FEATURE_TYPE_A,
-    FEATURE_TYPE_B,
-    SURFACE,
-    VERTEX,
-    write,
-)
+from collision_monitor.narrow_phase.contact_row import FEATURE_INDEX_B, FEATURE_TYPE_A, FEATURE_TYPE_B, write
+from collision_monitor.shapes.feature_types import EDGE, FACE, SURFACE, VERTEX
 from collision_monitor.tolerances import EPSILON
 
 

@@ -7,7 +7,8 @@ from typing import Any
 
 from collision_monitor._jit import inlined
 from collision_monitor.geometry.vector import Vector, across, column, dot, scaled
-from collision_monitor.narrow_phase.contact_row import FEATURE_TYPE_A, SURFACE, write
+from collision_monitor.narrow_phase.contact_row import FEATURE_TYPE_A, write
+from collision_monitor.shapes.feature_types import SURFACE
 from collision_monitor.tolerances import SAT_ROUND_OFF
 
 

@@ -7,7 +7,8 @@ from typing import Any
 
 from collision_monitor._jit import inlined
 from collision_monitor.geometry.vector import Vector, direction, dot, scaled
-from collision_monitor.narrow_phase.contact_row import FEATURE_TYPE_A, FEATURE_TYPE_B, SURFACE, write
+from collision_monitor.narrow_phase.contact_row import FEATURE_TYPE_A, FEATURE_TYPE_B, write
+from collision_monitor.shapes.feature_types import SURFACE
 from collision_monitor.tolerances import EPSILON
 
 

@@ -13,7 +13,7 @@ from collision_monitor.records import Model
 from collision_monitor.shapes.planar import flat_pose, is_planar
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.reach import reach
-from collision_monitor.shapes.shapes import Box, ConvexHull, HalfSpace, Mesh, Points, Polygon, Shape
+from collision_monitor.shapes.registry import Box, HalfSpace, Points, Polygon, Shape, kind_of
 from collision_monitor.tolerances import ROUNDED_UP
 
 Array = NDArray[np.float64]
@@ -49,16 +49,16 @@ def bounding_box_model(shapes: Sequence[tuple[Shape, Pose]]) -> Modelled:
 
 def _has_corners(shape: Shape) -> bool:
     """Whether a shape is the hull of its points."""
-    return isinstance(shape, ConvexHull | Mesh) or (isinstance(shape, Polygon) and shape.radius == 0.0)
+    kind = kind_of(shape)
+    return (kind.corners is not None and not kind.simple) or (isinstance(shape, Polygon) and shape.radius == 0.0)
 
 
 def _own_points(shape: Shape) -> Array:
     """Some points (n, 3) of a shape in its frame: all corners of a polytope, a cloud, the centre of a round shape."""
+    kind = kind_of(shape)
+    if kind.corners is not None and not kind.simple:  # the centre of a box tells more than its corners
+        return np.asarray(kind.corners(shape))
     match shape:
-        case ConvexHull():
-            return np.asarray(shape.points)
-        case Mesh():
-            return np.asarray(shape.vertices[np.unique(shape.faces)])
         case Points():
             return np.asarray(shape.points)
         case Polygon():

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.geometry.surface import first_equal
-from collision_monitor.shapes.shapes import Mesh
+from collision_monitor.shapes.registry import Mesh
 
 
 def separated(mesh: Mesh) -> tuple[Mesh, ...]:

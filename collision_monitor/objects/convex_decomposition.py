@@ -19,7 +19,8 @@ from collision_monitor.geometry.coordinates import Array, Indices
 from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.point_triangle import closest_point_on_triangle
 from collision_monitor.geometry.polyhedra import locate_in_polyhedron
-from collision_monitor.shapes.shapes import ConvexHull, Mesh, array_bytes
+from collision_monitor.shapes.registry import ConvexHull, Mesh
+from collision_monitor.shapes.shape import array_bytes
 
 CONCAVITY: Final = 0.05
 """CoACD's threshold, from 0.01 (many parts) to 1: concavity allowed in a part, relative to the mesh's size."""

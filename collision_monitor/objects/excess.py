@@ -19,8 +19,8 @@ from collision_monitor.geometry.qhull import QhullResult
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.reach import reach
+from collision_monitor.shapes.registry import Box, ConvexHull, Mesh, Shape, Sphere, Triangle, kind_of
 from collision_monitor.shapes.shape_table import ShapeTableBuilder, take
-from collision_monitor.shapes.shapes import Box, ConvexHull, Mesh, Shape, Sphere, Triangle
 
 Array = NDArray[np.float64]
 PosedShapes = list[tuple[Shape, Pose]]
@@ -75,8 +75,9 @@ def enclosing_points(pieces: PosedShapes) -> Array:
     """Points with a hull that contains the pieces: vertices of polytopes, corners of boxes around round shapes."""
     found = []
     for shape, pose in pieces:
-        if isinstance(shape, ConvexHull | Triangle):
-            points = shape.points
+        corners = kind_of(shape).corners
+        if corners is not None:
+            points = corners(shape)
         else:
             low, high = -reach([(shape, Pose())], -np.eye(3)), reach([(shape, Pose())], np.eye(3))
             points = np.array(list(product(*zip(low, high, strict=True))))

@@ -25,20 +25,7 @@ from collision_monitor.shapes.convex_pieces import convex_pieces, is_concave_mes
 from collision_monitor.shapes.planar import is_planar
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.reach import reach
-from collision_monitor.shapes.shapes import (
-    Box,
-    Capsule,
-    Cone,
-    ConvexHull,
-    Cylinder,
-    Ellipsoid,
-    HalfSpace,
-    Mesh,
-    Points,
-    Shape,
-    Sphere,
-    Triangle,
-)
+from collision_monitor.shapes.registry import Box, ConvexHull, HalfSpace, Mesh, Points, Shape, Sphere, Triangle, kind_of
 from collision_monitor.tolerances import ROUNDED_UP
 
 Array = NDArray[np.float64]
@@ -218,8 +205,10 @@ def _enclose(pieces: PosedShapes, model: Model) -> tuple[Shape, Pose]:
     single = len(pieces) == 1
     match model:
         case Model.SPHERE:
-            if single and isinstance(shape, Sphere | Box | Capsule | Cylinder | Ellipsoid):
-                return Sphere(float(reach([(shape, Pose())], _widest(shape))) * (1 + ROUNDED_UP)), pose
+            farthest = kind_of(shape).farthest
+            if single and farthest is not None:
+                d = farthest(shape)
+                return Sphere(float(reach([(shape, Pose())], d / np.linalg.norm(d))) * (1 + ROUNDED_UP)), pose
             ball = minimal_sphere(enclosing_points(pieces))
             return Sphere(float(ball.radius) * (1 + ROUNDED_UP)), Pose(ball.center)
         case Model.AABB:
@@ -237,26 +226,12 @@ def _enclose(pieces: PosedShapes, model: Model) -> tuple[Shape, Pose]:
             turned = Rotation.from_matrix(axes).as_quat()
             return _box(2 * box.half_extents), Pose(box.center, turned)
         case Model.CONVEX_HULL:
-            if any(isinstance(s, Sphere | Capsule | Cylinder | Cone | Ellipsoid) for s, _ in pieces):
+            if any(kind_of(s).round for s, _ in pieces):
                 if single:
                     return shape, pose
                 raise UnsupportedError("model convex_hull: the hull of several shapes with round ones is not offered")
             return ConvexHull(enclosing_points(pieces)), Pose()
     return _kdop(pieces, np.array(KDOP_DIRECTIONS[KDOPS[model]], float), model.name.lower())
-
-
-def _widest(shape: Sphere | Box | Capsule | Cylinder | Ellipsoid) -> Array:
-    """Direction in which a shape that is symmetric about its origin extends farthest."""
-    match shape:
-        case Box():
-            d = np.array(shape.size)
-        case Ellipsoid():
-            d = np.eye(3)[int(np.argmax(shape.radii))]
-        case Cylinder():
-            d = np.array([shape.radius, 0.0, shape.length / 2])
-        case _:
-            d = np.array([0.0, 0.0, 1.0])
-    return np.asarray(d / np.linalg.norm(d))
 
 
 def _box(size: Array) -> Box:

@@ -17,7 +17,7 @@ from collision_monitor.geometry.polygons import is_convex
 from collision_monitor.records import Model
 from collision_monitor.shapes.convex_pieces import is_convex_mesh
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import ConvexHull, HalfSpace, Mesh, Points, Polygon, Shape
+from collision_monitor.shapes.registry import ConvexHull, HalfSpace, Mesh, Points, Polygon, Shape, kind_of
 
 MESSAGE_MS: Final = 80.0
 """Estimated time (ms) for which the objects of one message may hold the thread that answers states. Larger: answers
@@ -53,7 +53,7 @@ _MODELS: Final = {
 
 def is_quick(shapes: Sequence[tuple[Shape, Pose]]) -> bool:
     """Whether an object is one shape with dimensions. All of its models take less than SMALL_MS."""
-    return len(shapes) == 1 and not isinstance(shapes[0][0], ConvexHull | Mesh | Points | Polygon)
+    return len(shapes) == 1 and kind_of(shapes[0][0]).simple
 
 
 class Budget:

@@ -15,11 +15,12 @@ import numpy as np
 
 from collision_monitor.objects.models import Modelled
 from collision_monitor.records import Model
-from collision_monitor.shapes import shapes
+from collision_monitor.shapes.kinds.convex_hull import TRIANGLE
 from collision_monitor.shapes.pose import Array, Pose
+from collision_monitor.shapes.registry import KINDS
 
 _REASON: Final = "reason"
-_KINDS: Final = {kind.__name__: kind for kind in shapes.Shape.__subclasses__()}
+_CLASSES: Final = {kind.shape.__name__: kind.shape for kind in (*KINDS, TRIANGLE)}
 
 
 def encode_model(model: Modelled | str) -> bytes:
@@ -62,7 +63,7 @@ def _decoded(arrays: dict[str, Any]) -> Modelled | str:
         k, dot, name = key.partition(".")
         if dot:
             values[int(k)][name] = value
-    pieces = [_KINDS[kind](**own) for kind, own in zip(arrays["kinds"].tolist(), values, strict=True)]
+    pieces = [_CLASSES[kind](**own) for kind, own in zip(arrays["kinds"].tolist(), values, strict=True)]
     poses = [_pose(*numbers) for numbers in zip(arrays["positions"], arrays["quaternions"], strict=True)]
     return Modelled(
         pieces=list(zip(pieces, poses, strict=True)),

@@ -79,7 +79,7 @@ def _make(data: bytes, number: int) -> bytes:
     from collision_monitor.objects.models import monitored_model
     from collision_monitor.pipeline.model_message import encode_model
     from collision_monitor.records import Model
-    from collision_monitor.shapes.shapes import ConvexHull
+    from collision_monitor.shapes.registry import ConvexHull
 
     try:
         (description,) = decode_descriptions(data).objects

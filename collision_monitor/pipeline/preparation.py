@@ -28,7 +28,7 @@ from collision_monitor.pipeline.model_message import decode_model
 from collision_monitor.pipeline.model_worker import COMMAND, ENVIRONMENT, JOB, LIMIT_BYTES, LIMIT_S, receive, send
 from collision_monitor.records import Model
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import ConvexHull, Mesh, Points, Polygon, Shape
+from collision_monitor.shapes.registry import ConvexHull, Mesh, Points, Polygon, Shape
 
 MOST_WAITING: Final = 64 << 20
 """Bytes of points and faces that may wait for their models. Objects beyond it keep their boxes, which is logged."""

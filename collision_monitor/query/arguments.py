@@ -11,7 +11,7 @@ import numpy as np
 
 from collision_monitor.errors import InputError, PoseError
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Shape
+from collision_monitor.shapes.registry import Shape
 
 Compound = Shape | Sequence[tuple[Shape, Pose]]
 """A shape, or several with their poses in the object's frame."""

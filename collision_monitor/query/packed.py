@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from collision_monitor._jit import inlined
 from collision_monitor.narrow_phase.work_memory import WORK_SIZE
 from collision_monitor.shapes.pose import Motion, Pose
+from collision_monitor.shapes.registry import KINDS
 from collision_monitor.shapes.shape_table import ShapeTable, ShapeTableBuilder
-from collision_monitor.shapes.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Sphere
 
 Array = NDArray[np.float64]
 
-PACKED_KINDS: Final = frozenset({Sphere, Box, Capsule, Cylinder, Cone, ConvexHull})
+PACKED_KINDS: Final = frozenset(kind.shape for kind in KINDS if kind.packed)
 """Classes of the solids that one row of the shape table represents exactly."""
 
 # a packed shape: kind, size (4), radius, number of vertices n, then n of all x, all y, all z and all vertex indices

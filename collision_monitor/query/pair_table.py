@@ -7,8 +7,8 @@ from typing import Final
 from collision_monitor.geometry.bounded_cache import bounded_cache
 from collision_monitor.meshes.trees.shape_trees import shape_tree
 from collision_monitor.shapes.forest import Forest
+from collision_monitor.shapes.registry import Mesh, Points, Shape
 from collision_monitor.shapes.shape_table import ShapeTable, ShapeTableBuilder
-from collision_monitor.shapes.shapes import Mesh, Points, Shape
 
 REMEMBERED: Final = 256 << 20
 """Bytes of the trees in all remembered tables."""

@@ -14,8 +14,9 @@ from collision_monitor.broad_phase.aabb_tree import aabb_tree
 from collision_monitor.geometry.bounded_cache import bounded_cache
 from collision_monitor.shapes.convex_pieces import convex_pieces, is_convex_mesh
 from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.registry import Mesh, Polygon, Shape, kind_of
+from collision_monitor.shapes.shape import array_bytes
 from collision_monitor.shapes.shape_table import ShapeTable, ShapeTableBuilder, join, triangle_table
-from collision_monitor.shapes.shapes import ConvexHull, HalfSpace, Mesh, Polygon, Shape, array_bytes
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -130,17 +131,11 @@ def piece_table(pieces: Sequence[tuple[Shape, Pose]]) -> PieceTable:
         builder.append(shape)
     position = np.stack([pose.position for _, pose in pieces])
     rotation = np.stack([pose.rotation for _, pose in pieces])
-    middle = np.array([_point_of(shape) for shape, _ in pieces])
+    middle = np.array([_middle(shape) for shape, _ in pieces])
     return PieceTable(builder.used, position, rotation, position + np.einsum("nij,nj->ni", rotation, middle))
 
 
-def _point_of(shape: Shape) -> Array:
+def _middle(shape: Shape) -> Array:
     """A point (3,) of a convex shape, in its own frame."""
-    match shape:
-        case ConvexHull():
-            return np.asarray(shape.points.mean(axis=0))
-        case Polygon():
-            return np.append(shape.points.mean(axis=0), 0.0)
-        case HalfSpace():
-            return np.asarray(shape.offset * shape.normal)
-    return np.zeros(3)
+    middle = kind_of(shape).middle
+    return np.zeros(3) if middle is None else middle(shape)

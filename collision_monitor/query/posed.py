@@ -17,7 +17,7 @@ from collision_monitor.records import Model
 from collision_monitor.shapes.compound import shape_pairs
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Mesh, Points, Shape
+from collision_monitor.shapes.registry import Mesh, Points, Shape
 from collision_monitor.tolerances import UNIT_QUATERNION
 
 Array = NDArray[np.float64]

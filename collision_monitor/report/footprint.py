@@ -11,7 +11,7 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session.history.history import Floats
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.reach import reach
-from collision_monitor.shapes.shapes import Box, ConvexHull, HalfSpace, Mesh, Points, Polygon, Shape, Triangle
+from collision_monitor.shapes.registry import HalfSpace, Points, Polygon, Shape, kind_of
 
 VIEWING_DIRECTIONS: Final = 64
 """Number of directions in the plane from which round shapes are sampled."""
@@ -39,14 +39,10 @@ def _outline(shape: Shape, pose: Pose) -> Floats | None:
             return _half_plane(shape, pose)
         case Polygon() if shape.radius == 0.0:
             return _from_above(np.pad(shape.points, ((0, 0), (0, 1))), pose)
-        case Box():
-            return _hull(shape.corners, pose)
-        case ConvexHull() | Triangle():
-            return _hull(shape.points, pose)
-        case Mesh():
-            return _hull(shape.vertices, pose)
         case Points():
             return _hull(shape.points, pose)
+    if (corners := kind_of(shape).corners) is not None:
+        return _hull(corners(shape), pose)
     return _round(shape, pose)
 
 

@@ -13,7 +13,7 @@ from collision_monitor.robots.urdf import Link
 from collision_monitor.robots.xml_tree import Element
 from collision_monitor.shapes.mesh_file import load_mesh
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, Capsule, Cylinder, Mesh, Shape, Sphere
+from collision_monitor.shapes.registry import Box, Capsule, Cylinder, Mesh, Shape, Sphere
 
 
 def link_shapes(link: Link, files: FileLocator) -> tuple[list[tuple[Shape, Pose]], list[str]]:

@@ -20,7 +20,7 @@ from collision_monitor.robots.touching_links import touching_links
 from collision_monitor.robots.urdf import parse_urdf
 from collision_monitor.robots.xml_tree import LARGEST_TEXT
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Shape
+from collision_monitor.shapes.registry import Shape
 
 Floats = NDArray[np.float64]
 

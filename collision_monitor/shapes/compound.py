@@ -9,7 +9,7 @@ import numpy as np
 
 from collision_monitor.errors import ShapeError
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Shape
+from collision_monitor.shapes.registry import Shape
 
 
 def shape_pairs(value: Any, what: str) -> tuple[tuple[Shape, Pose], ...]:

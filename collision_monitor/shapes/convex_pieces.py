@@ -14,7 +14,8 @@ from collision_monitor.geometry.polygons import is_convex
 from collision_monitor.geometry.qhull import HEIGHTS_AT_ONCE
 from collision_monitor.geometry.triangulation import convex_parts
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import ConvexHull, Mesh, Points, Polygon, Shape, Triangle, array_bytes
+from collision_monitor.shapes.registry import ConvexHull, Mesh, Points, Polygon, Shape, Triangle
+from collision_monitor.shapes.shape import array_bytes
 from collision_monitor.tolerances import HULL_DROP
 
 Array = NDArray[np.float64]

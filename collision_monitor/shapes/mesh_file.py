@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.surface import first_equal
-from collision_monitor.shapes.shapes import Mesh
+from collision_monitor.shapes.registry import Mesh
 from collision_monitor.tolerances import LARGEST_INPUT
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.errors import PoseError
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Circle, Polygon, Shape
+from collision_monitor.shapes.registry import Shape, kind_of
 
 PLANAR_VECTORS = {"position": slice(2, 3), "linear": slice(2, 3), "angular": slice(0, 2)}
 """Fields of records.STATE, and their components that the plane ignores."""
@@ -44,4 +44,4 @@ def flat_pose(pose: Pose) -> Pose:
 
 def is_planar(shape: Shape) -> bool:
     """Whether a shape lies in the x-y plane."""
-    return isinstance(shape, Circle | Polygon)
+    return kind_of(shape).planar

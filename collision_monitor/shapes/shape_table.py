@@ -6,58 +6,36 @@ The dtypes and the memory order never depend on the content, so that adding a sh
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf, sqrt
+from math import inf
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import InputError, ShapeError, UnsupportedError
-from collision_monitor.geometry.polygons import is_convex, is_counter_clockwise, polygon_corners
-from collision_monitor.geometry.qhull import hull_vertices
-from collision_monitor.records import ShapeType
-from collision_monitor.shapes import shapes
 from collision_monitor.shapes.forest import REACH, Forest
+from collision_monitor.shapes.kind import Row
+from collision_monitor.shapes.kinds.convex_hull import CONVEX_HULL, TRIANGLE_RING
+from collision_monitor.shapes.kinds.half_space import HALF_SPACE
 from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.registry import SUPPORTED_SHAPES, Points, Shape, kind_of
 
 Array = NDArray[np.float64]
-
-SPHERE: Final = int(ShapeType.SPHERE)
-BOX: Final = int(ShapeType.BOX)
-CAPSULE: Final = int(ShapeType.CAPSULE)
-CYLINDER: Final = int(ShapeType.CYLINDER)
-CONE: Final = int(ShapeType.CONE)
-CONVEX_HULL: Final = int(ShapeType.CONVEX_HULL)
-HALF_SPACE: Final = int(ShapeType.HALF_SPACE)
-CIRCLE: Final = int(ShapeType.CIRCLE)
-POLYGON: Final = int(ShapeType.POLYGON)
-ELLIPSOID: Final = int(ShapeType.ELLIPSOID)
-MESH: Final = int(ShapeType.MESH)
-POINTS: Final = int(ShapeType.POINTS)
 
 TREE: Final = 3
 """Column of `size` with the first block of the shape's tree plus 1, or 0; a half-space has its offset there."""
 
-SUPPORTED_SHAPES: Final = (
-    "Sphere, Box, Capsule, Cylinder, Cone, Ellipsoid, ConvexHull, HalfSpace; Circle, Polygon (convex) in the plane"
-)
-
 SHARED: Final = ("vertices", "vertex_index", "blocks")
 """Fields of a table without a row for each slot."""
-
-_TRIANGLE: Final = np.arange(3, dtype=np.int32)
-"""The corners of a triangle, in the form of `hull_vertices`."""
 
 
 class ShapeTable(NamedTuple):
     """K slots of shapes, and the hull vertices (m). A slot with kind 0 is free. Kernels take this as one argument.
 
-    size holds, by kind: sphere r | box half extents x, y, z | capsule r, half core length | cylinder r, half height |
-    cone r, half height | half-space normal x, y, z, offset | hull nothing | circle r | polygon number of corners |
-    ellipsoid half axes x, y, z. The radius of a polygon, and of a cloud's points, is part of its margin.
-    The last number of any other kind is its tree (TREE); a mesh and a cloud always have one, and nothing else.
+    What the numbers of `size` mean stands at `row` of each kind (kinds/), and whether its radius is part of the margin.
+    The last number of all kinds but the half-space is its tree (TREE); a mesh and a cloud always have one, and nothing
+    else.
     Hull vertices come in blocks padded to a multiple of LANES with the last vertex, so that the support scan has no
     tail.
     """
@@ -118,7 +96,7 @@ def triangle_table(corners: Array) -> ShapeTable:
     n = len(corners)
     table = _empty(n, LANES * n)
     radius = np.linalg.norm(corners, axis=2).max(axis=1)
-    lanes = np.minimum(np.arange(LANES, dtype=np.int32), _TRIANGLE[-1])
+    lanes = np.minimum(np.arange(LANES, dtype=np.int32), TRIANGLE_RING[-1])
     return table._replace(
         kind=np.full(n, CONVEX_HULL, np.uint8),
         radius=np.nextafter(radius * (1 + 1e-15), inf),
@@ -128,16 +106,6 @@ def triangle_table(corners: Array) -> ShapeTable:
         vertex_index=np.tile(lanes, n),
         local_rotation=np.tile(np.eye(3), (n, 1, 1)),
     )
-
-
-def convex_ring(points: Array) -> NDArray[np.int32]:
-    """Corner indices (n,) of a polygon (m, 2), counter-clockwise. Raises ShapeError if it is not convex."""
-    if len(points) == 2:
-        return np.arange(2, dtype=np.int32)
-    if not is_convex(points):
-        raise ShapeError("Polygon points: expected a convex polygon, got a concave one; see triangulation.convex_parts")
-    ring = polygon_corners(points)
-    return (ring if is_counter_clockwise(points) else ring[::-1]).astype(np.int32)
 
 
 class ShapeTableBuilder:
@@ -193,7 +161,7 @@ class ShapeTableBuilder:
 
     def append(
         self,
-        shape: shapes.Shape,
+        shape: Shape,
         pose: Pose | None = None,
         margin: float = 0.0,
         corners: NDArray[np.int32] | None = None,
@@ -207,58 +175,25 @@ class ShapeTableBuilder:
         """
         if not (np.isfinite(margin) and margin >= 0.0):
             raise ShapeError(f"margin: expected a finite number of metres >= 0, got {margin!r}")
-        start, count = 0, 0
-        size: tuple[float, ...]
-        match shape:
-            case shapes.Sphere():
-                kind, size, radius = SPHERE, (shape.radius,), shape.radius
-            case shapes.Box():
-                size = tuple(s / 2 for s in shape.size)
-                kind, radius = BOX, float(np.linalg.norm(size))
-            case shapes.Capsule():
-                kind, size, radius = CAPSULE, (shape.radius, shape.length / 2), shape.radius + shape.length / 2
-            case shapes.Cylinder():
-                kind, size = CYLINDER, (shape.radius, shape.length / 2)
-                radius = float(np.hypot(*size))
-            case shapes.Cone():
-                kind, size = CONE, (shape.radius, shape.length / 2)
-                radius = float(np.hypot(*size))
-            case shapes.Ellipsoid() if len(set(shape.radii)) == 1:
-                kind, size, radius = SPHERE, shape.radii[:1], shape.radii[0]  # which has closed forms
-            case shapes.Ellipsoid():
-                kind, size, radius = ELLIPSOID, shape.radii, max(shape.radii)
-            case shapes.HalfSpace():
-                kind, size, radius = HALF_SPACE, (*shape.normal, shape.offset), inf
-            case shapes.ConvexHull() | shapes.Triangle():
-                kind, size, radius = CONVEX_HULL, (), float(np.linalg.norm(shape.points, axis=1).max())
-                if corners is None:
-                    corners = _TRIANGLE if isinstance(shape, shapes.Triangle) else hull_vertices(shape.points)
-                start, count = self._share(shape.points, corners)
-            case shapes.Circle():
-                kind, size, radius = CIRCLE, (shape.radius,), shape.radius
-            case shapes.Polygon():
-                ring = convex_ring(shape.points)
-                kind, size, radius = POLYGON, (len(ring),), float(np.linalg.norm(shape.points, axis=1).max())
-                start, count = self._share(np.pad(shape.points, ((0, 0), (0, 1))), ring)
-                margin += shape.radius
-            case shapes.Mesh() if tree is not None:
-                kind, size, radius = MESH, (), float(tree[REACH])
-            case shapes.Points() if tree is not None:
-                kind, size, radius = POINTS, (), float(tree[REACH])
-                margin += shape.radius
-            case _:
-                raise UnsupportedError(f"{type(shape).__name__} has no narrow phase; supported are {SUPPORTED_SHAPES}")
+        kind = kind_of(shape)
+        row = kind.row(shape, corners)
+        if row is None and tree is not None:
+            row = Row(kind.number, (), float(tree[REACH]), shape.radius if isinstance(shape, Points) else 0.0)
+        if row is None:
+            raise UnsupportedError(f"{type(shape).__name__} has no narrow phase; supported are {SUPPORTED_SHAPES}")
+        start, count = (0, 0) if row.ring is None or row.points is None else self._share(row.points, row.ring)
+        margin += row.margin
         slot = self._new_slot()
         table = self.table
         table.size[slot] = 0.0
-        table.size[slot, : len(size)] = size
+        table.size[slot, : len(row.size)] = row.size
         table.margin[slot] = margin
         # rounded up, because the sphere must contain the shape in spite of round-off
-        table.radius[slot] = np.nextafter(radius * (1 + 1e-15) + margin, inf)
+        table.radius[slot] = np.nextafter(row.radius * (1 + 1e-15) + margin, inf)
         table.vertex_start[slot], table.vertex_count[slot] = start, count
         table.local_position[slot] = 0.0 if pose is None else pose.position
         table.local_rotation[slot] = np.eye(3) if pose is None else pose.rotation
-        table.kind[slot] = kind
+        table.kind[slot] = row.number
         if tree is not None:
             self.plant(slot, tree)
         return slot
@@ -349,53 +284,3 @@ class ShapeTableBuilder:
         self._users = {moved[start]: user for start, user in self._users.items()}
         self._free_blocks.clear()
         self._vertices = len(source)
-
-
-@device
-def bounds(table: Any, slot: int, R: Any, out: Any) -> None:
-    """Tight axis-aligned bounds of a shape under rotation R_WA (3, 3), about its origin, including its margin.
-
-    out[0:3] = lower, out[3:6] = upper (m). A half-space is unbounded: -inf and inf.
-    """
-    kind = table.kind[slot]
-    m = table.margin[slot]
-    s0 = table.size[slot, 0]
-    s1 = table.size[slot, 1]
-    for i in range(3):
-        x, y, z = R[i, 0], R[i, 1], R[i, 2]
-        if kind == BOX:
-            upper = abs(x) * s0 + abs(y) * s1 + abs(z) * table.size[slot, 2]
-            lower = -upper
-        elif kind == SPHERE:
-            upper = s0
-            lower = -s0
-        elif kind == CAPSULE:
-            upper = abs(z) * s1 + s0
-            lower = -upper
-        elif kind == CYLINDER:
-            upper = abs(z) * s1 + s0 * sqrt(x * x + y * y)
-            lower = -upper
-        elif kind == CONE:
-            rim = s0 * sqrt(x * x + y * y)
-            upper = max(z * s1, rim - z * s1)
-            lower = min(z * s1, -rim - z * s1)
-        elif kind == ELLIPSOID:
-            s2 = table.size[slot, 2]
-            upper = sqrt(x * x * s0 * s0 + y * y * s1 * s1 + z * z * s2 * s2)
-            lower = -upper
-        elif kind == CIRCLE:
-            upper = s0 * sqrt(x * x + y * y)
-            lower = -upper
-        elif kind == CONVEX_HULL or kind == POLYGON:
-            upper = -inf
-            lower = inf
-            first = table.vertex_start[slot]
-            for k in range(first, first + table.vertex_count[slot]):
-                d = x * table.vertices[0, k] + y * table.vertices[1, k] + z * table.vertices[2, k]
-                upper = max(upper, d)
-                lower = min(lower, d)
-        else:
-            upper = inf
-            lower = -inf
-        out[i] = lower - m
-        out[3 + i] = upper + m

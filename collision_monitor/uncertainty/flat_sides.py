@@ -10,7 +10,10 @@ from math import sqrt
 from typing import Final
 
 from collision_monitor._jit import device
-from collision_monitor.shapes.shape_table import BOX, CAPSULE, CYLINDER, SPHERE
+from collision_monitor.shapes.kinds.box import BOX
+from collision_monitor.shapes.kinds.capsule import CAPSULE
+from collision_monitor.shapes.kinds.cylinder import CYLINDER
+from collision_monitor.shapes.kinds.sphere import SPHERE
 
 LEVEL: Final = 0.1
 """Cosine of the angle between a plane's normal and an axis of the shape below which the plane is along the axis."""

@@ -17,7 +17,11 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.vector import cross
-from collision_monitor.shapes.shape_table import BOX, CAPSULE, CIRCLE, CYLINDER, SPHERE
+from collision_monitor.shapes.kinds.box import BOX
+from collision_monitor.shapes.kinds.capsule import CAPSULE
+from collision_monitor.shapes.kinds.circle import CIRCLE
+from collision_monitor.shapes.kinds.cylinder import CYLINDER
+from collision_monitor.shapes.kinds.sphere import SPHERE
 from collision_monitor.uncertainty.samples.normal_samples import FURTHEST
 
 STEEP: Final = 0.8

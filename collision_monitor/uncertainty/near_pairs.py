@@ -12,7 +12,7 @@ from typing import NamedTuple
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.impact.body_contact import relative_now
 from collision_monitor.impact.sphere_interval import sphere_interval
-from collision_monitor.shapes.shape_table import BOX
+from collision_monitor.shapes.kinds.box import BOX
 from collision_monitor.uncertainty.spread import is_uncertain, surface_spread, swing_radius
 
 

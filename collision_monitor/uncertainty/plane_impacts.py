@@ -11,7 +11,7 @@ from collision_monitor._jit import device, inlined
 from collision_monitor.impact.body_impact import ImpactQuery, ShapePair, Tube, Window, shape_impact
 from collision_monitor.impact.impact_record import CLEAR
 from collision_monitor.motion.bodies import next_pair
-from collision_monitor.shapes.shape_table import HALF_SPACE
+from collision_monitor.shapes.kinds.half_space import HALF_SPACE
 from collision_monitor.uncertainty.cutting_planes import (
     CutSettings,
     begin_segment,

@@ -15,7 +15,8 @@ from collision_monitor.motion.bodies import place_shape
 from collision_monitor.motion.motion import half_acceleration
 from collision_monitor.narrow_phase.cylinder_cylinder import is_parallel
 from collision_monitor.narrow_phase.pair_pose import PairPose
-from collision_monitor.shapes.shape_table import CYLINDER, SPHERE
+from collision_monitor.shapes.kinds.cylinder import CYLINDER
+from collision_monitor.shapes.kinds.sphere import SPHERE
 from collision_monitor.uncertainty.pair_errors import spin_rate, turned_at
 from collision_monitor.uncertainty.samples.error_samples import LEFT_OVER, ORIENTATION, errors_turn
 from collision_monitor.uncertainty.samples.normal_samples import FURTHEST

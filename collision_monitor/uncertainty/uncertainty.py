@@ -29,7 +29,8 @@ from collision_monitor.impact.tree_impact import spins
 from collision_monitor.motion.bodies import next_pair
 from collision_monitor.motion.motion import carry_on, half_acceleration, relative_position
 from collision_monitor.narrow_phase.contact_row import NORMAL, POINT_A, POINT_B
-from collision_monitor.shapes.shape_table import MESH, POINTS
+from collision_monitor.shapes.kinds.mesh import MESH
+from collision_monitor.shapes.kinds.points import POINTS
 from collision_monitor.uncertainty.impact_distribution import summarise
 from collision_monitor.uncertainty.obstacle_planes import NOT_OFF
 from collision_monitor.uncertainty.pair_errors import spin_rate

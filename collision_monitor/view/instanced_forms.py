@@ -18,11 +18,10 @@ from numpy.typing import NDArray
 from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.triangulation import triangulate
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import (
+from collision_monitor.shapes.registry import (
     Box,
     Capsule,
     Circle,
-    Cone,
     ConvexHull,
     Cylinder,
     Ellipsoid,
@@ -32,8 +31,9 @@ from collision_monitor.shapes.shapes import (
     Polygon,
     Shape,
     Sphere,
+    kind_of,
 )
-from collision_monitor.shapes.surfaces import surface_triangles
+from collision_monitor.shapes.surface_parts import UNIT_CORNERS, box_triangles
 
 Floats = NDArray[np.float64]
 Scale = tuple[float, float, float]
@@ -95,8 +95,6 @@ def pieces_of(shape: Shape, pose: Pose) -> Iterator[Piece]:
             yield Piece(unit["box"], pose, size)
         case Cylinder(radius=r, length=length):
             yield Piece(unit["cylinder"], pose, (r, r, length))
-        case Cone(radius=r, length=length):
-            yield Piece(unit["cone"], pose, (r, r, length))
         case Circle(radius=r):
             yield Piece(unit["disc"], pose, (r, r, 1.0))
         case Capsule(radius=r, length=length):
@@ -108,14 +106,14 @@ def pieces_of(shape: Shape, pose: Pose) -> Iterator[Piece]:
         case Polygon():
             yield Piece(_own_form("polygon", _filled(shape), closed=False), pose, (1.0, 1.0, 1.0))
         case ConvexHull():
-            yield Piece(_own_form("hull", _outward(surface_triangles(shape)), closed=True), pose, (1.0, 1.0, 1.0))
+            hull = _outward(kind_of(shape).triangles(shape))
+            yield Piece(_own_form("hull", hull, closed=True), pose, (1.0, 1.0, 1.0))
         case Points():
             yield Piece(_cloud(shape), pose, (1.0, 1.0, 1.0))
         case _:
-            closed = not isinstance(shape, Mesh)
-            yield Piece(
-                _own_form(type(shape).__name__.lower(), surface_triangles(shape), closed=closed), pose, (1.0, 1.0, 1.0)
-            )
+            kind, closed = kind_of(shape), not isinstance(shape, Mesh)
+            own = _own_form(kind.name.replace(" ", "_"), kind.triangles(shape), closed=closed)
+            yield Piece(own, pose, (1.0, 1.0, 1.0))
 
 
 @cache
@@ -123,16 +121,15 @@ def unit_forms() -> dict[str, Form]:
     """Return the forms of unit size: radius 1, height or extent 1."""
     angles = np.linspace(-np.pi / 2, np.pi / 2, SIDES // 2 + 1)
     sphere = np.stack([np.cos(angles), np.sin(angles)], axis=1)
-    side, slope = np.array([(1.0, -0.5), (1.0, 0.5)]), np.array([(1.0, -0.5), (0.0, 0.5)])
+    side = np.array([(1.0, -0.5), (1.0, 0.5)])
     floor, roof = np.array([(0.0, -0.5), (1.0, -0.5)]), np.array([(1.0, 0.5), (0.0, 0.5)])
     corner = np.array([(-0.5, -0.5, 0.0), (0.5, -0.5, 0.0), (0.5, 0.5, 0.0), (-0.5, 0.5, 0.0)])
     forms = (
         _revolved("sphere", sphere),
         _revolved("cylinder", floor, side, roof),
         _revolved("tube", side),
-        _revolved("cone", floor, slope),
         _revolved("disc", np.array([(1.0, 0.0), (0.0, 0.0)]), closed=False),
-        _welded("box", surface_triangles(Box((1.0, 1.0, 1.0))), closed=True),
+        _welded("box", box_triangles(UNIT_CORNERS), closed=True),
         _welded(PLANE, corner[[[0, 1, 2], [0, 2, 3]]], closed=False),
     )
     return {form.name: form for form in forms}
@@ -187,7 +184,7 @@ def _filled(polygon: Polygon) -> Floats:
             return filled
         except ShapeError:
             pass
-    return surface_triangles(polygon)
+    return kind_of(polygon).triangles(polygon)
 
 
 def _plane_pose(shape: HalfSpace) -> Pose:

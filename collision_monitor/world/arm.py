@@ -12,7 +12,7 @@ import numpy as np
 from collision_monitor.errors import InputError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.shapes.pose import Pose, from_rotation_vector, multiply, rotation_matrix
-from collision_monitor.shapes.shapes import Mesh
+from collision_monitor.shapes.registry import Mesh
 from collision_monitor.world.scene import Array, Scene, States, positive_rate, state_array
 
 CIRCLE_SEGMENTS: Final = 32

@@ -6,7 +6,7 @@ import numpy as np
 
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.shapes.pose import from_rotation_vector, multiply
-from collision_monitor.shapes.shapes import Box, Capsule, Cylinder, Shape, Sphere
+from collision_monitor.shapes.registry import Box, Capsule, Cylinder, Shape, Sphere
 from collision_monitor.world.rigid.collision_response import bounce_between_walls
 from collision_monitor.world.scene import Array, Scene, States, object_count, positive_rate, state_array
 

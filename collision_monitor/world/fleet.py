@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.shapes.pose import Pose, from_rotation_vector
-from collision_monitor.shapes.shapes import Box, Capsule, Cylinder
+from collision_monitor.shapes.registry import Box, Capsule, Cylinder
 from collision_monitor.world.scene import Array, Scene, States, object_count, positive_rate, state_array
 
 Integers = NDArray[np.int64]

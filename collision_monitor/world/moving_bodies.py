@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.qhull import qhull
 from collision_monitor.shapes.pose import from_rotation_vector, multiply
-from collision_monitor.shapes.shapes import Box, Capsule, ConvexHull, Cylinder, Shape, Sphere
+from collision_monitor.shapes.registry import Box, Capsule, ConvexHull, Cylinder, Shape, Sphere
 
 Array = NDArray[np.float64]
 

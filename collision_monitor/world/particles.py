@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.shapes.shapes import Sphere
+from collision_monitor.shapes.registry import Sphere
 from collision_monitor.world.hard_spheres.time_step import step_spheres
 from collision_monitor.world.rigid.walls import closed_box
 from collision_monitor.world.scene import Array, Scene, States, object_count, positive_rate, state_array

@@ -11,7 +11,7 @@ from collision_monitor.records import StateFlag
 from collision_monitor.response.bonded import groups
 from collision_monitor.response.contact_set import Bodies, Contacts
 from collision_monitor.response.simultaneous import bodies_collide_together
-from collision_monitor.shapes.shapes import Sphere
+from collision_monitor.shapes.registry import Sphere
 from collision_monitor.world.rigid.response_choice import AS_USUAL, ResponseChoice
 from collision_monitor.world.scene import Array, Scene, States, object_count, positive_rate, state_array
 

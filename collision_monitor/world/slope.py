@@ -8,7 +8,7 @@ from typing import ClassVar, Final
 import numpy as np
 
 from collision_monitor.shapes.pose import Pose, from_rotation_vector
-from collision_monitor.shapes.shapes import Box, Sphere
+from collision_monitor.shapes.registry import Box, Sphere
 from collision_monitor.world.rigid.response_choice import AS_USUAL, ResponseChoice
 from collision_monitor.world.rigid.rigid_scene import GROUND, RigidScene
 from collision_monitor.world.scene import object_count, positive_rate

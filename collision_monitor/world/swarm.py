@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.shapes.shapes import Cylinder
+from collision_monitor.shapes.registry import Cylinder
 from collision_monitor.world.scene import Array, Scene, States, object_count, positive_rate, state_array
 
 CUBE_PER_DRONE: Final = 3.0

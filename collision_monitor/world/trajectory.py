@@ -19,7 +19,7 @@ from collision_monitor.errors import InputError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
 from collision_monitor.shapes.pose import from_rotation_vector, multiply
-from collision_monitor.shapes.shapes import Box, Cylinder, Shape
+from collision_monitor.shapes.registry import Box, Cylinder, Shape
 from collision_monitor.world.scene import TIME_ROUND_OFF, Scene, States, positive_rate, state_array
 from collision_monitor.world.track_file import TrackFile, read_track_file
 

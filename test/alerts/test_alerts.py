@@ -24,7 +24,7 @@ from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.pipeline.settings_event import encode_settings
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, Cylinder, Sphere
+from collision_monitor.shapes.registry import Box, Cylinder, Sphere
 from test.helpers.alert_scene import CLASSES, STEP_NS, AlertScene, States, rules_of
 
 CART = ObjectDescription(1, Box((2.0, 1.0, 1.0)), name="cart")

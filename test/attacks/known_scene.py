@@ -16,7 +16,7 @@ from collision_monitor.codec import (
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import STATE, Phase, PredictionStatus, StateFlag
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, Sphere
+from collision_monitor.shapes.registry import Box, Sphere
 
 BALL, WALL, LEFT, RIGHT, NORTH, SOUTH = range(1, 7)
 IDS: Final = frozenset((BALL, WALL, LEFT, RIGHT, NORTH, SOUTH))

@@ -23,7 +23,7 @@ from collision_monitor.records import STATE, Model
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.convex_pieces import is_convex_mesh
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, Circle, ConvexHull, Cylinder, HalfSpace, Mesh, Sphere
+from collision_monitor.shapes.registry import Box, Circle, ConvexHull, Cylinder, HalfSpace, Mesh, Sphere
 
 SIDES = [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from collision_monitor.shapes.shapes import Sphere
+from collision_monitor.shapes.registry import Sphere
 
 ROOT = Path(__file__).parents[2]
 SOAK = ROOT / "benchmarks" / "soak.py"

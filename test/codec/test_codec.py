@@ -15,7 +15,7 @@ from collision_monitor.codec.status import LIVE_FIELDS
 from collision_monitor.errors import MessageError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import (
+from collision_monitor.shapes.registry import (
     Box,
     Capsule,
     Circle,

@@ -13,8 +13,8 @@ from collision_monitor.detection.partitioned import BROAD_PHASES
 from collision_monitor.errors import InputError, PoseError, UnsupportedError
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.shapes.pose import rotation_matrix
+from collision_monitor.shapes.registry import Box, Capsule, ConvexHull, Cylinder, HalfSpace, Mesh, Shape, Sphere
 from collision_monitor.shapes.shape_table import ShapeTableBuilder
-from collision_monitor.shapes.shapes import Box, Capsule, ConvexHull, Cylinder, HalfSpace, Mesh, Shape, Sphere
 
 Array = NDArray[np.float64]
 N = 300

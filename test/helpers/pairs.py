@@ -8,7 +8,7 @@ from itertools import product
 import numpy as np
 
 from collision_monitor.narrow_phase.dispatch import contact_batch, separation_batch
-from collision_monitor.shapes import shapes
+from collision_monitor.shapes import registry as shapes
 from collision_monitor.shapes.shape_table import ShapeTableBuilder
 
 AB = np.array([[0, 1]], np.int32)

@@ -14,7 +14,7 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.session import Recorder
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, Sphere
+from collision_monitor.shapes.registry import Box, Sphere
 from collision_monitor.world import make_scene
 from collision_monitor.world.scene import Scene, States, state_array
 

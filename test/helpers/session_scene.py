@@ -17,7 +17,7 @@ from collision_monitor.session import Recorder
 from collision_monitor.session.recording.recorder import FLUSH_PERIOD
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, Capsule, Sphere
+from collision_monitor.shapes.registry import Box, Capsule, Sphere
 
 NODE = "/object_monitor"
 TYPES = {

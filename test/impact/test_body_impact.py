@@ -13,8 +13,7 @@ from collision_monitor.motion.bodies import Multibody, make_bodies, make_parts
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.records import ShapeType
 from collision_monitor.shapes.pose import from_rotation_vector, multiply, rotation_matrix
-from collision_monitor.shapes.shape_table import ShapeTableBuilder
-from collision_monitor.shapes.shapes import (
+from collision_monitor.shapes.registry import (
     Box,
     Capsule,
     Cone,
@@ -25,6 +24,7 @@ from collision_monitor.shapes.shapes import (
     Shape,
     Sphere,
 )
+from collision_monitor.shapes.shape_table import ShapeTableBuilder
 
 TOLERANCE = 1e-6
 HORIZON = 2.0

@@ -8,7 +8,7 @@ import pytest
 from collision_monitor.impact.sphere_trees import LEVELS, body_tree
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.shapes.pose import Pose, from_rotation_vector
-from collision_monitor.shapes.shapes import Box, ConvexHull, Cylinder, Shape, Sphere
+from collision_monitor.shapes.registry import Box, ConvexHull, Cylinder, Shape, Sphere
 
 TURNED = Pose((0.3, -2.0, 5.0), tuple(from_rotation_vector(np.array([0.4, 1.1, -0.7]))))
 

@@ -14,7 +14,7 @@ from collision_monitor.meshes.overlap.common_part import common_part, is_flat, n
 from collision_monitor.meshes.overlap.common_point import common_ball
 from collision_monitor.meshes.placing import relative
 from collision_monitor.meshes.trees.shape_trees import made_tree
-from collision_monitor.shapes.shapes import Mesh
+from collision_monitor.shapes.registry import Mesh
 
 Array = NDArray[np.float64]
 SLACK = 1e-10

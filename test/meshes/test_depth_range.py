@@ -14,7 +14,7 @@ from collision_monitor.meshes.overlap.touching_triangles import trees_touch
 from collision_monitor.meshes.placing import relative
 from collision_monitor.meshes.trees.shape_trees import made_tree
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE, DISTANCE
-from collision_monitor.shapes.shapes import Box, ConvexHull, Mesh, Shape, Sphere
+from collision_monitor.shapes.registry import Box, ConvexHull, Mesh, Shape, Sphere
 from collision_monitor.world.arm import link
 
 RNG = np.random.default_rng(3)

@@ -17,8 +17,8 @@ from collision_monitor.meshes.distance.solid_range import solid_range
 from collision_monitor.meshes.trees.shape_trees import made_tree
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.shapes.registry import Box, Cone, Cylinder, Ellipsoid, HalfSpace, Mesh, Points, Shape
 from collision_monitor.shapes.shape_table import ShapeTable, ShapeTableBuilder
-from collision_monitor.shapes.shapes import Box, Cone, Cylinder, Ellipsoid, HalfSpace, Mesh, Points, Shape
 from collision_monitor.world.arm import link
 
 RNG = np.random.default_rng(3)

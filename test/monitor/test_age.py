@@ -12,7 +12,7 @@ from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.pipeline.settings_event import NOW, encode_settings
 from collision_monitor.records import PredictionStatus
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Sphere
+from collision_monitor.shapes.registry import Sphere
 
 IMPACT = 1.0
 """s: two balls of 0.5 m, 2 m apart, at 1 m/s."""

@@ -10,7 +10,7 @@ from collision_monitor.errors import ProfileError
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, Sphere
+from collision_monitor.shapes.registry import Box, Sphere
 from collision_monitor.world import make_scene
 
 RATE = 20.0

@@ -16,7 +16,7 @@ from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.pipeline.preparation import Preparation
 from collision_monitor.records import STATE, ContactStatus, Model, PredictionStatus
 from collision_monitor.settings.profile import Profile
-from collision_monitor.shapes.shapes import MOST_CLOUD_POINTS
+from collision_monitor.shapes.kinds.points import MOST_CLOUD_POINTS
 
 SECOND = 1_000_000_000
 TORUS = trimesh.creation.torus(1.0, 0.35, major_sections=14, minor_sections=8)

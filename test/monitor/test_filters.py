@@ -15,7 +15,7 @@ from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, HalfSpace, Sphere
+from collision_monitor.shapes.registry import Box, HalfSpace, Sphere
 from collision_monitor.world import make_scene
 
 SECOND = 1_000_000_000

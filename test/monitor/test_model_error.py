@@ -8,7 +8,7 @@ from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile
-from collision_monitor.shapes.shapes import Box, Mesh
+from collision_monitor.shapes.registry import Box, Mesh
 
 
 def bracket() -> Mesh:

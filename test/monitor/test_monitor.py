@@ -17,7 +17,7 @@ from collision_monitor.monitor.result import StepResult
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose, from_rotation_vector, multiply, rotation_matrix
-from collision_monitor.shapes.shapes import Box, Capsule, Circle, HalfSpace, Shape, Sphere
+from collision_monitor.shapes.registry import Box, Capsule, Circle, HalfSpace, Shape, Sphere
 from collision_monitor.world import make_scene
 
 SECOND = 1_000_000_000

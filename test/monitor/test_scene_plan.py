@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 from collision_monitor.monitor.monitor import Monitor
-from collision_monitor.narrow_phase.dispatch import KIND_NAMES, pair_test
+from collision_monitor.narrow_phase.dispatch import pair_test
 from collision_monitor.records import Phase, PredictionStatus
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, Circle, Cone, ConvexHull, Cylinder, HalfSpace, Sphere
+from collision_monitor.shapes.registry import KIND_NAMES, Box, Circle, Cone, ConvexHull, Cylinder, HalfSpace, Sphere
 
 sys.path.insert(0, str(Path(__file__).parents[2] / "benchmarks"))
 import scene_plan

@@ -13,8 +13,8 @@ from collision_monitor.monitor.state.snapshot import Snapshot, Stage
 from collision_monitor.records import STATE
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.registry import Box, Capsule, HalfSpace, Sphere
 from collision_monitor.shapes.shape_table import ShapeTableBuilder
-from collision_monitor.shapes.shapes import Box, Capsule, HalfSpace, Sphere
 
 STAGES = [type(stage) for stage in Monitor().stages]
 

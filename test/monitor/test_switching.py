@@ -18,7 +18,7 @@ from collision_monitor.monitor.result import StepResult
 from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, ConvexHull, Cylinder, HalfSpace, Mesh, Points, Sphere
+from collision_monitor.shapes.registry import Box, ConvexHull, Cylinder, HalfSpace, Mesh, Points, Sphere
 from collision_monitor.world import make_scene
 
 SECOND = 1_000_000_000

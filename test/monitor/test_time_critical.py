@@ -20,7 +20,7 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, ConvexHull
+from collision_monitor.shapes.registry import Box, ConvexHull
 from collision_monitor.world import Scene, make_scene
 
 SECOND = 1_000_000_000

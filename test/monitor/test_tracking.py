@@ -12,7 +12,7 @@ from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.records import PredictionStatus
 from collision_monitor.settings.profile import Profile
-from collision_monitor.shapes.shapes import Sphere
+from collision_monitor.shapes.registry import Sphere
 from collision_monitor.world import make_scene
 
 FIRST, SECOND, OTHER = 1, 2, 3

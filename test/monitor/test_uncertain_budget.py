@@ -10,7 +10,7 @@ import pytest
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.records import STATE, Method, PredictionStatus
 from collision_monitor.settings.profile import Profile
-from collision_monitor.shapes.shapes import Box, Cylinder
+from collision_monitor.shapes.registry import Box, Cylinder
 
 PEOPLE = 60
 WHOLE = Profile()

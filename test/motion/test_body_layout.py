@@ -8,8 +8,8 @@ import pytest
 from collision_monitor.motion.bodies import Multibody, make_bodies, make_parts
 from collision_monitor.motion.body_layout import lay_out_body, note_plain
 from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.registry import Box, Capsule, Circle, Cone, Cylinder, Ellipsoid, Shape, Sphere
 from collision_monitor.shapes.shape_table import ShapeTableBuilder
-from collision_monitor.shapes.shapes import Box, Capsule, Circle, Cone, Cylinder, Ellipsoid, Shape, Sphere
 
 SHAPES = (Sphere(0.3), Box((0.2, 0.4, 0.6)), Capsule(0.1, 0.5), Cylinder(0.2, 0.7), Cone(0.3, 0.4))
 SHAPES += (Ellipsoid((0.1, 0.2, 0.3)),)

@@ -10,8 +10,8 @@ from collision_monitor.narrow_phase.gjk import EXACT, Accuracy
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.work_memory import work_array
 from collision_monitor.shapes.pose import rotation_matrix
+from collision_monitor.shapes.registry import Box, Capsule, Cylinder, Shape
 from collision_monitor.shapes.shape_table import ShapeTableBuilder
-from collision_monitor.shapes.shapes import Box, Capsule, Cylinder, Shape
 
 NEAR, SLACK = 0.05, 0.01
 

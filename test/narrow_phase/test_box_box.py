@@ -7,7 +7,7 @@ import pytest
 from minkowski import polytope_signed_distance, rotation
 from pairs import EYE, contact, points_of, projected_gap
 
-from collision_monitor.shapes.shapes import Box
+from collision_monitor.shapes.registry import Box
 
 VERTEX, EDGE, FACE = 1, 2, 3
 

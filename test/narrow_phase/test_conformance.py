@@ -12,7 +12,7 @@ from pairs import contact, size
 
 import collision_monitor as cm
 from collision_monitor.shapes.pose import rotation_matrix
-from collision_monitor.shapes.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, HalfSpace, Sphere
+from collision_monitor.shapes.registry import Box, Capsule, Cone, Cylinder, Ellipsoid, HalfSpace, Sphere
 
 CASES = Path(__file__).parents[3] / "shared" / "conformance" / "cases.json"
 

@@ -7,7 +7,7 @@ import pytest
 from minkowski import polytope_signed_distance, rotation
 from pairs import EYE, contact, points_of, projected_gap, support
 
-from collision_monitor.shapes.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Sphere
+from collision_monitor.shapes.registry import Box, Capsule, Cone, ConvexHull, Cylinder, Sphere
 
 
 def random_hull(rng):

@@ -10,7 +10,7 @@ from minkowski import rotation
 from pairs import EYE, contact, points_of, projected_gap, size
 
 import collision_monitor as cm
-from collision_monitor.shapes.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Mesh, Sphere
+from collision_monitor.shapes.registry import Box, Capsule, Cone, ConvexHull, Cylinder, Mesh, Sphere
 
 CUBE = points_of(Box((1, 1, 1)))
 ANGLES = [0.0, *(10.0**-k for k in (3, 5, 7, 8, 9, 10, 12, 14, 16))]

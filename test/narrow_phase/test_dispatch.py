@@ -11,23 +11,21 @@ import pytest
 
 from collision_monitor.narrow_phase import dispatch
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE
-from collision_monitor.narrow_phase.dispatch import KIND_NAMES, PAIR_TESTS, TEST_METHODS, pair_test
+from collision_monitor.narrow_phase.dispatch import PAIR_TESTS, TEST_METHODS, pair_test
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.work_memory import work_array
-from collision_monitor.shapes.shape_table import (
-    BOX,
-    CAPSULE,
-    CIRCLE,
-    CONE,
-    CONVEX_HULL,
-    CYLINDER,
-    ELLIPSOID,
-    HALF_SPACE,
-    POLYGON,
-    SPHERE,
-    ShapeTableBuilder,
-)
-from collision_monitor.shapes.shapes import (
+from collision_monitor.shapes.kinds.box import BOX
+from collision_monitor.shapes.kinds.capsule import CAPSULE
+from collision_monitor.shapes.kinds.circle import CIRCLE
+from collision_monitor.shapes.kinds.cone import CONE
+from collision_monitor.shapes.kinds.convex_hull import CONVEX_HULL
+from collision_monitor.shapes.kinds.cylinder import CYLINDER
+from collision_monitor.shapes.kinds.ellipsoid import ELLIPSOID
+from collision_monitor.shapes.kinds.half_space import HALF_SPACE
+from collision_monitor.shapes.kinds.polygon import POLYGON
+from collision_monitor.shapes.kinds.sphere import SPHERE
+from collision_monitor.shapes.registry import (
+    KIND_NAMES,
     Box,
     Capsule,
     Circle,
@@ -39,6 +37,7 @@ from collision_monitor.shapes.shapes import (
     Polygon,
     Sphere,
 )
+from collision_monitor.shapes.shape_table import ShapeTableBuilder
 
 SHAPES = {
     SPHERE: Sphere(0.5),

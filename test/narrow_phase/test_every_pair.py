@@ -13,8 +13,8 @@ from minkowski import rotation
 from pairs import contact
 
 from collision_monitor.narrow_phase.dispatch import contact_batch
+from collision_monitor.shapes.registry import Box, Capsule, Cone, ConvexHull, Cylinder, Ellipsoid, HalfSpace, Sphere
 from collision_monitor.shapes.shape_table import ShapeTableBuilder
-from collision_monitor.shapes.shapes import Box, Capsule, Cone, ConvexHull, Cylinder, Ellipsoid, HalfSpace, Sphere
 
 ROCK = ConvexHull(np.random.default_rng(3).normal(size=(32, 3)) * 0.4)
 EGG = Ellipsoid((0.3, 0.5, 0.7))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from pairs import contact
 
-from collision_monitor.shapes.shapes import Capsule, Cone, Cylinder, Sphere
+from collision_monitor.shapes.registry import Capsule, Cone, Cylinder, Sphere
 
 SHAPES = (Cone(0.25, 0.5), Cone(0.5, 1.0), Capsule(0.25, 0.5), Sphere(0.3), Cylinder(0.25, 0.5), Cylinder(0.5, 1.0))
 UPRIGHT, UPSIDE_DOWN = np.eye(3), np.diag([1.0, -1.0, -1.0])

@@ -9,7 +9,7 @@ import pytest
 from minkowski import rotation
 from pairs import EYE, contact
 
-from collision_monitor.shapes.shapes import Box, Capsule, HalfSpace, Sphere
+from collision_monitor.shapes.registry import Box, Capsule, HalfSpace, Sphere
 
 
 def test_spheres_against_rational_arithmetic():

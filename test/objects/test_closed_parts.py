@@ -7,8 +7,8 @@ import pytest
 import trimesh
 
 import collision_monitor as cm
-from collision_monitor.narrow_phase.contact_row import FACE
 from collision_monitor.objects.closed_parts import separated
+from collision_monitor.shapes.feature_types import FACE
 
 BOX = trimesh.creation.box((2.0, 2.0, 2.0))
 RING = trimesh.creation.torus(1.0, 0.4, major_sections=24, minor_sections=12)

@@ -9,7 +9,7 @@ from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ALL_GROUPS, ObjectDescription
 from collision_monitor.records import Model
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, Sphere
+from collision_monitor.shapes.registry import Box, Sphere
 
 
 def test_a_single_shape_becomes_one_pair_at_the_origin():

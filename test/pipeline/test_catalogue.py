@@ -11,7 +11,7 @@ from collision_monitor.codec import Change, ObjectDescriptionArray, Removal
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.catalogue import Catalogue
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Sphere
+from collision_monitor.shapes.registry import Sphere
 
 
 def ball(object_id: int, name: str = "", *, static: bool = False) -> ObjectDescription:

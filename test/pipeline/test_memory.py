@@ -19,7 +19,7 @@ from collision_monitor.monitor.state import roster
 from collision_monitor.objects.description import MOST_NAME_BYTES, ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.shapes.convex_pieces import REMEMBERED_PIECES, convex_pieces
-from collision_monitor.shapes.shapes import ConvexHull, Mesh, Sphere
+from collision_monitor.shapes.registry import ConvexHull, Mesh, Sphere
 
 STAMP = 1_000_000_000_000
 BALL = Sphere(0.5)

@@ -23,7 +23,7 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Outputs, Pipeline
 from collision_monitor.records import Model
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, HalfSpace, Sphere
+from collision_monitor.shapes.registry import Box, HalfSpace, Sphere
 
 STEP = 10_000_000
 START = 1_000_000_000_000

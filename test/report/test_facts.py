@@ -16,7 +16,7 @@ from collision_monitor.report.footprint import footprint
 from collision_monitor.session import Session
 from collision_monitor.session.history.alerts import AlertOutcome, stated_error
 from collision_monitor.session.history.read_history import read_history
-from collision_monitor.shapes.shapes import Box, HalfSpace, Polygon
+from collision_monitor.shapes.registry import Box, HalfSpace, Polygon
 from collision_monitor.world.crossing import Crossing
 
 STEP = 0.02

@@ -13,7 +13,7 @@ from collision_monitor import records
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.topics import Topic
 from collision_monitor.ros.endpoints import quality_of
-from collision_monitor.shapes.shapes import Box, Sphere
+from collision_monitor.shapes.registry import Box, Sphere
 from collision_monitor_msgs.msg import CollisionAlert, CollisionAlertArray
 
 RULES = """\

@@ -22,7 +22,7 @@ from collision_monitor.session import Session
 from collision_monitor.session.replaying.replay import replay
 from collision_monitor.session.replaying.replay_report import Verdict
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, Sphere
+from collision_monitor.shapes.registry import Box, Sphere
 from collision_monitor.world import make_scene
 from collision_monitor_msgs.msg import Contact, MonitorStatus
 

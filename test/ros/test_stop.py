@@ -18,7 +18,7 @@ from collision_monitor.records import Model
 from collision_monitor.session import Session
 from collision_monitor.session.replaying.replay import replay
 from collision_monitor.session.replaying.replay_report import Verdict
-from collision_monitor.shapes.shapes import Mesh, Sphere
+from collision_monitor.shapes.registry import Mesh, Sphere
 
 END = 3.0
 """s: the promise is 2 s, and the tests share the machine."""

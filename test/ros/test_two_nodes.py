@@ -7,7 +7,7 @@ import numpy as np
 
 from collision_monitor import records
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.shapes.shapes import Sphere
+from collision_monitor.shapes.registry import Sphere
 
 WARNING = "another node has the name /object_monitor"
 

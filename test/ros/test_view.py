@@ -12,7 +12,7 @@ from browser import CHROMIUM, Browser, until
 from collision_monitor import records
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, Sphere
+from collision_monitor.shapes.registry import Box, Sphere
 
 
 def state(object_id, x, speed=0.0):

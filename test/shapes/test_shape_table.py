@@ -9,14 +9,20 @@ from numba import njit
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import InputError, ShapeError, UnsupportedError
 from collision_monitor.geometry.qhull import hull_vertices
-from collision_monitor.shapes import shapes
+from collision_monitor.narrow_phase.core import rounding
+from collision_monitor.shapes import registry as shapes
+from collision_monitor.shapes.calls import core_support
 from collision_monitor.shapes.pose import Pose, rotation_matrix
-from collision_monitor.shapes.shape_table import ShapeTableBuilder, bounds
+from collision_monitor.shapes.shape_table import ShapeTableBuilder
 
 
 @njit
 def _bounds(table, slot, R, out):
-    bounds(table, slot, R, out)
+    """Bounds along the axes of the world, from the support values that all kernels use."""
+    for i in range(3):
+        x, y, z = R[i, 0], R[i, 1], R[i, 2]
+        out[i] = -core_support(table, slot, -x, -y, -z) - rounding(table, slot)
+        out[3 + i] = core_support(table, slot, x, y, z) + rounding(table, slot)
 
 
 def _rotation(rng):

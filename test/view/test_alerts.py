@@ -12,7 +12,7 @@ from collision_monitor.alerts.rules import Rules
 from collision_monitor.codec import decode_alert, encode_descriptions
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session import Recorder, Session
-from collision_monitor.shapes.shapes import Sphere
+from collision_monitor.shapes.registry import Sphere
 from collision_monitor.view.levels import COLORS, Level
 from collision_monitor.view.picture import Role, draw
 from collision_monitor.view.recording import Recording

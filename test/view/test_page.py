@@ -21,7 +21,7 @@ from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session import Recorder, Session
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import ConvexHull, Points
+from collision_monitor.shapes.registry import ConvexHull, Points
 from collision_monitor.view.page import MOST_HIDDEN, Page
 from collision_monitor.view.panel import WIDTH, look_at
 from collision_monitor.view.picture import draw

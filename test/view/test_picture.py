@@ -13,7 +13,7 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.records import ContactStatus, Phase, PredictionStatus, StateFlag
 from collision_monitor.shapes.pose import Motion, Pose
-from collision_monitor.shapes.shapes import (
+from collision_monitor.shapes.registry import (
     Box,
     Capsule,
     Circle,

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from collision_monitor.records import StateFlag
-from collision_monitor.shapes.shapes import Box, Capsule, Sphere
+from collision_monitor.shapes.registry import Box, Capsule, Sphere
 from collision_monitor.world import make_scene
 
 SCENE = make_scene("crossing")

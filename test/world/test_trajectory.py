@@ -8,7 +8,7 @@ import pytest
 
 from collision_monitor.errors import InputError
 from collision_monitor.records import StateFlag
-from collision_monitor.shapes.shapes import Box, Cylinder
+from collision_monitor.shapes.registry import Box, Cylinder
 from collision_monitor.world import make_scene
 from collision_monitor.world.trajectory import FRAME_RATE
 

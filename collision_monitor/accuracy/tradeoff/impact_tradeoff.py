@@ -16,7 +16,7 @@ from collision_monitor.query.impact.impact_by_method import NUMBERS
 from collision_monitor.query.impact.time_of_impact import Impact, time_of_impact
 from collision_monitor.shapes.pose import Motion, Pose
 from collision_monitor.shapes.reach import reach
-from collision_monitor.shapes.shapes import HalfSpace, Shape
+from collision_monitor.shapes.registry import HalfSpace, Shape
 
 METHODS: Final = ("conservative_advancement", *NUMBERS)
 HORIZON: Final = 2.0

@@ -20,7 +20,7 @@ from collision_monitor.query.contact.contact import contact
 from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box
+from collision_monitor.shapes.registry import Box
 
 NEAR: Final = 0.3
 """Largest distance of the pairs that are compared (m)."""

@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Any, Final
+from typing import Any
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.vector import Vector, along, dot, minus
 from collision_monitor.meshes.distance.triangle_pair import Corners, normal
-from collision_monitor.narrow_phase.contact_row import EDGE, FACE, VERTEX
 from collision_monitor.narrow_phase.gjk import closest_on_triangle, weighted
-from collision_monitor.shapes.shape_table import CONE, CYLINDER, ELLIPSOID
+from collision_monitor.shapes.feature_types import EDGE, FACE, VERTEX
+from collision_monitor.shapes.registry import CURVED
+from collision_monitor.shapes.revolved import ROUND_TIE
 from collision_monitor.tolerances import FEATURE_TIE
-
-ROUND_TIE: Final = 1e-6
-"""FEATURE_TIE of pairs with a cylinder, a cone or an ellipsoid, and the sine of the angle between a normal and an axis
-below which they count as parallel. On round surfaces the normals of GJK are off by up to 1e-7, and the depths of EPA by
-1e-6 of the size. Larger: a tilted cylinder stands on its face."""
 
 WHOLE_FACE, WHOLE_EDGE, CORNER, ON_EDGE, IN_FACE = range(5)
 """Ranks of features at a point, the best first: a face or an edge that touches as a whole, since the normal is at a
@@ -26,12 +22,7 @@ right angle to it; the vertex at the point; the edge or the face that contains i
 @inlined
 def slot_tie(table: Any, a: int, b: int) -> float:
     """Largest difference of equal heights on one of two shapes, as a part of its size."""
-    return ROUND_TIE if _is_curved(table.kind[a]) or _is_curved(table.kind[b]) else FEATURE_TIE
-
-
-@inlined
-def _is_curved(kind: int) -> bool:
-    return kind == CYLINDER or kind == CONE or kind == ELLIPSOID
+    return ROUND_TIE if CURVED[table.kind[a]] or CURVED[table.kind[b]] else FEATURE_TIE
 
 
 @device

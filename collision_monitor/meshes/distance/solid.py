@@ -28,7 +28,6 @@ from collision_monitor.meshes.boxes import half_of
 from collision_monitor.meshes.distance.contact import reach_in
 from collision_monitor.meshes.distance.feature import slot_tie, triangle_feature
 from collision_monitor.meshes.distance.nearest import NEAR_A, triangle_at
-from collision_monitor.meshes.distance.point_solid import point_solid_distance
 from collision_monitor.meshes.distance.triangle_pair import Corners
 from collision_monitor.meshes.layout import CENTER, CHILD, FACE, RADIUS, WIDTH
 from collision_monitor.meshes.overlap.touching_triangles import repeats
@@ -41,15 +40,16 @@ from collision_monitor.narrow_phase.contact_row import (
     NORMAL,
     POINT_A,
     POINT_B,
-    VERTEX,
     write,
 )
 from collision_monitor.narrow_phase.convex_convex import cores_contact
 from collision_monitor.narrow_phase.core import Core, CorePair, core_length, core_of, rounding
 from collision_monitor.narrow_phase.pair_pose import PairPose
-from collision_monitor.narrow_phase.sphere_cone import sphere_cone_contact
-from collision_monitor.narrow_phase.support_value import core_support
-from collision_monitor.shapes.shape_table import CONE, CONVEX_HULL, HALF_SPACE, SPHERE
+from collision_monitor.shapes.calls import core_support, point_distance_range
+from collision_monitor.shapes.feature_types import VERTEX
+from collision_monitor.shapes.kinds.convex_hull import CONVEX_HULL
+from collision_monitor.shapes.kinds.half_space import HALF_SPACE
+from collision_monitor.shapes.kinds.sphere import SPHERE
 from collision_monitor.tolerances import SAT_ROUND_OFF
 
 MOST_EXAMINED: Final = 5_000
@@ -115,22 +115,19 @@ def _point_contact(
 ) -> bool:
     """As `triangle_solid_contact`, for a point of A: in closed form where there is one, otherwise by GJK and EPA."""
     y = place_point(inverse(relative(pose.R_A, pose.R_B, pose.p)), x)
-    distance, d, is_exact = point_solid_distance(table, b, y)
+    distance, most, d = point_distance_range(table, b, y)
     x = rotate(pose.R_A, x)
-    if is_exact:
+    if distance == most:
         n = rotate(pose.R_B, d)
         distance -= radius + table.margin[b]
         scale = sum_of_sizes(pose.p) + sum_of_sizes(x) + radius + table.size[b, 0] + table.size[b, 1] + table.size[b, 2]
         write(out, distance, opposite(n), along(x, -radius, n), SAT_ROUND_OFF * scale)
         return distance <= limit
     p = minus(pose.p, x)
-    if table.kind[b] == CONE:
-        sphere_cone_contact(radius, table.size[b, 0], table.size[b, 1], table.margin[b], pose.R_B, p, out)
-    else:
-        cores = CorePair(Core(SPHERE, (0.0, 0.0, 0.0), 0, 0), core_of(table, b), table.vertices)
-        radii, at = (radius, rounding(table, b)), PairPose(pose.R_A, pose.R_B, p)
-        if not cores_contact(cores, radii, core_length(table, b), at, limit, out, memory.gjk):
-            return False
+    cores = CorePair(Core(SPHERE, (0.0, 0.0, 0.0), 0, 0), core_of(table, b), table.vertices)
+    radii, at = (radius, rounding(table, b)), PairPose(pose.R_A, pose.R_B, p)
+    if not cores_contact(cores, radii, core_length(table, b), at, limit, out, memory.gjk):
+        return False
     for c in range(3):
         out[POINT_A + c] += x[c]
         out[POINT_B + c] += x[c]
@@ -198,7 +195,7 @@ def solid_contact(
                 if blocks[block, CHILD, k] == 0.0:
                     continue
                 c = center_of(blocks, block, k)
-                bound, n, _ = point_solid_distance(table, b, place_point(Y, c))
+                bound, _, n = point_distance_range(table, b, place_point(Y, c))
                 n = minus(place_point(X, n), (X.x, X.y, X.z))
                 bound -= box_reach_along(blocks, block, k, n) + margin + table.margin[b]
                 if bound <= enough:
@@ -210,7 +207,7 @@ def solid_contact(
             T = triangle_at(blocks, block, k)
             radius = blocks[block, RADIUS, k] + margin
             c, size = _middle(T)
-            bound, _, _ = point_solid_distance(table, b, place_point(Y, c))
+            bound, _, _ = point_distance_range(table, b, place_point(Y, c))
             if bound - size - radius - table.margin[b] > enough:
                 continue
             examined += 1
@@ -317,5 +314,5 @@ def leaf_solid_time(
 @inlined
 def _distance_along(solid: MovingSolid, c: Vector) -> tuple[float, Vector]:
     """Lower bound on the distance (m) of a point of A's frame from the solid, and its direction to the solid."""
-    bound, n, _ = point_solid_distance(solid.table, solid.b, place_point(inverse(solid.X), c))
+    bound, _, n = point_distance_range(solid.table, solid.b, place_point(inverse(solid.X), c))
     return bound, opposite(minus(place_point(solid.X, n), (solid.X.x, solid.X.y, solid.X.z)))

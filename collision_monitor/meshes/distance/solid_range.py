@@ -12,7 +12,6 @@ from typing import Any, Final
 from collision_monitor._jit import inlined, outlined
 from collision_monitor.geometry.vector import Vector, along, dot, minus, opposite, rotate, sum_of_sizes
 from collision_monitor.meshes.distance.nearest import NEAR_A, triangle_at
-from collision_monitor.meshes.distance.point_range import point_range
 from collision_monitor.meshes.distance.solid import (
     SolidMemory,
     box_reach_along,
@@ -25,6 +24,7 @@ from collision_monitor.meshes.overlap.touching_triangles import repeats
 from collision_monitor.meshes.placing import inverse, place_point, relative
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, write
 from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.shapes.calls import point_distance_range
 from collision_monitor.tolerances import SAT_ROUND_OFF
 
 MOST_EXAMINED: Final = 300
@@ -56,7 +56,7 @@ def solid_range(
         block, first = root + int(abs(child)), waiting
         if child < 0.0:  # one corner is enough if it is as deep as the box can be
             x, radius = triangle_at(blocks, block, 0).a, blocks[block, RADIUS, 0] + margin
-            _, upper, n = point_range(table, b, place_point(Y, x))
+            _, upper, n = point_distance_range(table, b, place_point(Y, x))
             upper -= radius + table.margin[b]
             if upper <= 0.0 and work[2 * waiting] >= min(upper, most) - wanted:
                 if upper < most:
@@ -67,7 +67,7 @@ def solid_range(
             if child > 0.0:
                 if blocks[block, CHILD, k] == 0.0:
                     continue
-                lower, _, n = point_range(table, b, place_point(Y, center_of(blocks, block, k)))
+                lower, _, n = point_distance_range(table, b, place_point(Y, center_of(blocks, block, k)))
                 n = minus(place_point(X, n), (X.x, X.y, X.z))
                 lower -= box_reach_along(blocks, block, k, n) + margin + table.margin[b]
                 if lower <= 0.0:
@@ -123,7 +123,7 @@ def _range_of(table: Any, b: int, p: Any, q: Any, r: Any) -> Any:
     lower, upper, best, normal = -inf, inf, c, (1.0, 0.0, 0.0)
     for k in range(4):
         x = c if k == 0 else (p if k == 1 else (q if k == 2 else r))
-        bound, at_most, n = point_range(table, b, x)
+        bound, at_most, n = point_distance_range(table, b, x)
         lower = max(lower, bound + min(0.0, dot(n, minus(p, x)), dot(n, minus(q, x)), dot(n, minus(r, x))))
         if at_most < upper or k == 0:
             upper, best, normal = at_most, x, n

@@ -14,7 +14,7 @@ from collision_monitor.meshes.distance.contact import tree_reach
 from collision_monitor.meshes.trees.cloud_tree import cloud_tree
 from collision_monitor.meshes.trees.tree import tree_of
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
-from collision_monitor.shapes.shapes import Box, Capsule, ConvexHull, Mesh, Points, Shape, Sphere, Triangle
+from collision_monitor.shapes.registry import Box, Capsule, ConvexHull, Mesh, Points, Shape, Sphere, Triangle
 
 Array = NDArray[np.float64]
 

@@ -8,8 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.meshes.trees.shape_trees import made_tree
-from collision_monitor.shapes.shape_table import BOX, CAPSULE, CONVEX_HULL, MESH, SPHERE, TREE, ShapeTableBuilder
-from collision_monitor.shapes.shapes import Box, Capsule, ConvexHull, Sphere, Triangle
+from collision_monitor.shapes.kinds.box import BOX
+from collision_monitor.shapes.kinds.capsule import CAPSULE
+from collision_monitor.shapes.kinds.convex_hull import CONVEX_HULL
+from collision_monitor.shapes.kinds.mesh import MESH
+from collision_monitor.shapes.kinds.sphere import SPHERE
+from collision_monitor.shapes.registry import Box, Capsule, ConvexHull, Sphere, Triangle
+from collision_monitor.shapes.shape_table import TREE, ShapeTableBuilder
 
 Array = NDArray[np.float64]
 

@@ -5,7 +5,7 @@ Only the pairs that touch need it.
 
 from __future__ import annotations
 
-from math import inf, sqrt
+from math import inf
 from typing import Any, Final
 
 from collision_monitor._jit import device, inlined
@@ -22,7 +22,6 @@ from collision_monitor.geometry.vector import (
 from collision_monitor.impact.body_contact import SHAPE_I, SHAPE_J, STATUS, TOUCHING, relative_now
 from collision_monitor.impact.mesh_pair import has_mesh
 from collision_monitor.meshes.distance.feature import (
-    ROUND_TIE,
     feature_in_triangle,
     number_in_hull,
     off_segment,
@@ -37,95 +36,31 @@ from collision_monitor.motion.motion import age_of, position_now, rotation_now
 from collision_monitor.narrow_phase.contact_row import (
     BOUND,
     DISTANCE,
-    EDGE,
-    FACE,
     FEATURE_INDEX_A,
     FEATURE_TYPE_A,
     FEATURE_TYPE_B,
     NORMAL,
     POINT_A,
     POINT_B,
-    SURFACE,
-    UNKNOWN,
-    VERTEX,
 )
 from collision_monitor.narrow_phase.core import Core, CorePair, core_length, core_of, rounding
 from collision_monitor.narrow_phase.gjk import EXACT, gjk, simplex_point
-from collision_monitor.narrow_phase.support_value import core_support
 from collision_monitor.narrow_phase.work_memory import P_AB, R_AB
-from collision_monitor.shapes.shape_table import (
-    BOX,
-    CONE,
-    CONVEX_HULL,
-    CYLINDER,
-    HALF_SPACE,
-    MESH,
-    POINTS,
-    POLYGON,
-    SPHERE,
-    TREE,
-)
+from collision_monitor.shapes.calls import core_support, point_feature
+from collision_monitor.shapes.feature_types import EDGE, FACE, UNKNOWN, VERTEX
+from collision_monitor.shapes.kinds.convex_hull import CONVEX_HULL
+from collision_monitor.shapes.kinds.half_space import HALF_SPACE
+from collision_monitor.shapes.kinds.mesh import MESH
+from collision_monitor.shapes.kinds.points import POINTS
+from collision_monitor.shapes.kinds.polygon import POLYGON
+from collision_monitor.shapes.kinds.sphere import SPHERE
+from collision_monitor.shapes.shape_table import TREE
 from collision_monitor.tolerances import FEATURE_TIE, SAT_ROUND_OFF
 
 LIFT: Final = 1e-3
 """Height above a hull, as a part of its size, from which the nearest point of the hull is searched to find the face at
 a point of it. The nearest point is beside that point by the height times the error of the normal, which may be 1e-3 for
 round surfaces. Larger: points near an edge are put on it. Smaller: the direction to the nearest point is round-off."""
-
-
-@device
-def _of_box(table: Any, s: int, x: Vector, n: Vector, reach: float) -> tuple[float, float]:
-    """Feature of a box, numbered as in box_box.py."""
-    gap = (table.size[s, 0] - abs(x[0]), table.size[s, 1] - abs(x[1]), table.size[s, 2] - abs(x[2]))
-    outermost = max(min(gap[0], min(gap[1], gap[2])), reach)  # the point is at this side, even if it is below it
-    sides, level, beside, last = 0, 0, 0, 0  # as bits: at a side; along it a corner is as high as the other; positive
-    for c in range(3):
-        if gap[c] <= outermost:
-            sides |= 1 << c
-        else:
-            last = c
-        if 2.0 * table.size[s, c] * abs(n[c]) <= reach:
-            level |= 1 << c
-        if (n[c] if table.size[s, c] <= reach else x[c]) > 0.0:
-            beside |= 1 << c
-    for c in range(3):
-        upward = (n[c] > 0.0) == (beside >> c & 1 == 1)
-        if sides >> c & 1 and level | 1 << c == 7 and upward:
-            return FACE, 2.0 * c + (0.0 if beside >> c & 1 else 1.0)
-    edge = -1
-    for c in range(3):
-        if level >> c & 1 and sides | 1 << c == 7:
-            edge = c
-    if edge < 0 and sides == 7:
-        return VERTEX, float(beside)
-    if edge < 0 and sides | 1 << last == 7:
-        edge = last
-    if edge >= 0:
-        return EDGE, 4.0 * edge + (beside >> (edge + 1) % 3 & 1) + 2.0 * (beside >> (edge + 2) % 3 & 1)
-    c = 0 if sides & 1 else (1 if sides & 2 else 2)
-    return FACE, 2.0 * c + (0.0 if beside >> c & 1 else 1.0)
-
-
-@device
-def _of_solid_of_revolution(table: Any, s: int, x: Vector, n: Vector, reach: float) -> tuple[float, float]:
-    """Feature of a cylinder or a cone, numbered as in geometry/round_features.py."""
-    r, h = table.size[s, 0], table.size[s, 1]
-    reach = max(reach, ROUND_TIE * (r + 2.0 * h))
-    rim, away = sqrt(n[0] * n[0] + n[1] * n[1]), sqrt(x[0] * x[0] + x[1] * x[1])
-    if table.kind[s] == CYLINDER:
-        end, slope, side = (1.0 if x[2] < 0.0 else 0.0), n[2], r - away
-        base, down = h - abs(x[2]), (-n[2] if x[2] < 0.0 else n[2])
-    else:
-        if away * away + (x[2] - h) ** 2 <= reach * reach:
-            return VERTEX, 0.0
-        slant = sqrt(4.0 * h * h + r * r)
-        end, slope, side = 0.0, (2.0 * h * n[2] - r * rim) / slant, (r * (h - x[2]) - 2.0 * h * away) / slant
-        base, down = x[2] + h, -n[2]
-    if abs(slope) <= ROUND_TIE or base > max(reach, side):  # a line of the side touches as a whole; or below the base
-        return SURFACE, 0.0
-    if abs(r - away) <= reach and not (rim <= ROUND_TIE and down > 0.0):
-        return EDGE, end
-    return FACE, end
 
 
 @inlined
@@ -207,18 +142,11 @@ def shape_feature_at(table: Any, s: int, x: Vector, n: Vector, reach: float, wor
     it; else the vertex at the point, else the edge or the face that contains it. So a normal that is a little off does
     not move the feature away from the point. reach (m): heights and distances up to it count as 0.
     """
-    kind = table.kind[s]
-    if kind == BOX:
-        return _of_box(table, s, x, n, reach)
-    if kind == CYLINDER or kind == CONE:
-        return _of_solid_of_revolution(table, s, x, n, reach)
-    if kind == CONVEX_HULL:
+    if table.kind[s] == CONVEX_HULL:
         return _of_hull(table, s, x, n, reach, work)
-    if kind == POLYGON:
+    if table.kind[s] == POLYGON:
         return _of_polygon(table, s, n)
-    if kind == HALF_SPACE:
-        return FACE, 0.0
-    return SURFACE, 0.0
+    return point_feature(table, s, x, n, reach)
 
 
 @inlined

@@ -24,22 +24,21 @@ from collision_monitor.monitor.state.snapshot import Snapshot, check_range
 from collision_monitor.motion.bodies import place_shape
 from collision_monitor.motion.motion import rotation_now
 from collision_monitor.narrow_phase.contact_row import (
-    FACE,
     FEATURE_INDEX_A,
     FEATURE_TYPE_A,
     FEATURE_TYPE_B,
     NORMAL,
     POINT_A,
     POINT_B,
-    UNKNOWN,
 )
 from collision_monitor.objects.closed_parts import separated
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled
 from collision_monitor.records import Model
+from collision_monitor.shapes.feature_types import FACE, UNKNOWN
+from collision_monitor.shapes.kinds.convex_hull import CONVEX_HULL
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shape_table import CONVEX_HULL
-from collision_monitor.shapes.shapes import ConvexHull, Mesh
+from collision_monitor.shapes.registry import ConvexHull, Mesh
 from collision_monitor.tolerances import LARGEST_INPUT
 
 Array = NDArray[np.float64]

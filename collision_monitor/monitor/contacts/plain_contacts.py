@@ -29,7 +29,7 @@ from collision_monitor.narrow_phase.core import half_extents
 from collision_monitor.narrow_phase.dispatch import mirror
 from collision_monitor.narrow_phase.pair_pose import PairPose, swapped
 from collision_monitor.narrow_phase.sphere_sphere import sphere_sphere_contact
-from collision_monitor.shapes.shape_table import SPHERE
+from collision_monitor.shapes.kinds.sphere import SPHERE
 from collision_monitor.tolerances import FACE_PREFERENCE, SAT_ROUND_OFF
 
 

@@ -38,8 +38,8 @@ from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DIST
 from collision_monitor.narrow_phase.core import rounding
 from collision_monitor.narrow_phase.dispatch import mirror
 from collision_monitor.narrow_phase.pair_pose import PairPose, swapped
-from collision_monitor.narrow_phase.support_value import core_support
-from collision_monitor.shapes.shape_table import HALF_SPACE
+from collision_monitor.shapes.calls import core_support
+from collision_monitor.shapes.kinds.half_space import HALF_SPACE
 
 
 @inlined

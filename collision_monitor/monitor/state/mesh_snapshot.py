@@ -12,8 +12,9 @@ from collision_monitor.meshes.trees.cloud_tree import cloud_tree, tree_points
 from collision_monitor.meshes.trees.slot_trees import plant_trees
 from collision_monitor.meshes.trees.tree_surface import TreeSurface, surface_of
 from collision_monitor.monitor.state.snapshot import Snapshot, check_range
-from collision_monitor.shapes.shape_table import MESH, POINTS, TREE, ShapeTable, ShapeTableBuilder
-from collision_monitor.shapes.shapes import MOST_CLOUD_POINTS
+from collision_monitor.shapes.kinds.mesh import MESH
+from collision_monitor.shapes.kinds.points import MOST_CLOUD_POINTS, POINTS
+from collision_monitor.shapes.shape_table import TREE, ShapeTable, ShapeTableBuilder
 from collision_monitor.tolerances import LARGEST_INPUT
 
 

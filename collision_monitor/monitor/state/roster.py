@@ -26,9 +26,11 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled, monitored_model
 from collision_monitor.records import Model, ShapeType
 from collision_monitor.settings.by_name import Classes, value_of
+from collision_monitor.shapes.kinds.polygon import POLYGON
 from collision_monitor.shapes.planar import flat_pose, is_planar
-from collision_monitor.shapes.shape_table import POLYGON, SHARED, TREE, ShapeTable, ShapeTableBuilder
-from collision_monitor.shapes.shapes import HalfSpace, Mesh, Points, array_bytes
+from collision_monitor.shapes.registry import HalfSpace, Mesh, Points
+from collision_monitor.shapes.shape import array_bytes
+from collision_monitor.shapes.shape_table import SHARED, TREE, ShapeTable, ShapeTableBuilder
 
 FIRST_CAPACITY = 64
 """Initial number of body slots; it is doubled when all are used."""

@@ -34,7 +34,7 @@ from collision_monitor.query.posed import check_in_plane, posed
 from collision_monitor.records import Model
 from collision_monitor.shapes.planar import is_planar
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Mesh
+from collision_monitor.shapes.registry import Mesh
 from collision_monitor.tolerances import FEATURE_TIE
 
 Array = NDArray[np.float64]

@@ -10,8 +10,7 @@ from collision_monitor.query.contact.contact import Contact
 from collision_monitor.shapes.compound import shape_pairs
 from collision_monitor.shapes.planar import is_planar
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Circle, HalfSpace, Shape
-from collision_monitor.shapes.surfaces import surface_triangles
+from collision_monitor.shapes.registry import Circle, HalfSpace, Shape, kind_of
 
 COLOURS = "tab:blue", "tab:orange"
 
@@ -68,7 +67,7 @@ def _draw_flat(axes: Any, shape: Shape, pose: Pose, colour: str) -> Any:
 def _draw_solid(axes: Any, shape: Shape, pose: Pose, colour: str) -> Any:
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    triangles = surface_triangles(shape) @ pose.rotation.T + pose.position
+    triangles = kind_of(shape).triangles(shape) @ pose.rotation.T + pose.position
     faces = Poly3DCollection(triangles, facecolor=colour, edgecolor=colour, linewidth=0.2, alpha=0.25)
     axes.add_collection3d(faces)
     return np.zeros((0, 3)) if isinstance(shape, HalfSpace) else triangles.reshape(-1, 3)  # a half-space has no end

@@ -8,7 +8,7 @@ from collision_monitor.errors import InputError
 from collision_monitor.geometry.contact_features import FeatureType
 from collision_monitor.query.contact.features import feature_of, shape_tie
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, ConvexHull, Mesh, Points, Shape
+from collision_monitor.shapes.registry import Box, ConvexHull, Mesh, Points, Shape
 
 if TYPE_CHECKING:
     from collision_monitor.geometry.coordinates import Array

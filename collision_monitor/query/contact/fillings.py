@@ -17,7 +17,8 @@ from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
 from collision_monitor.meshes.trees.shape_trees import kept_tree
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, ConvexHull, Mesh, Shape, array_bytes
+from collision_monitor.shapes.registry import Box, ConvexHull, Mesh, Shape
+from collision_monitor.shapes.shape import array_bytes
 from collision_monitor.tolerances import ROUNDED_UP
 
 LEAST_THICKNESS: Final = 1e-6

@@ -23,7 +23,7 @@ from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DIST
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.query.packed import packed_pose
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Shape
+from collision_monitor.shapes.registry import Shape
 from collision_monitor.tolerances import EPSILON
 
 Array = NDArray[np.float64]

@@ -20,7 +20,7 @@ from collision_monitor.query.contact.surface_pair import surface_contact
 from collision_monitor.query.posed import Posed, pose_in_world
 from collision_monitor.records import Model
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
-from collision_monitor.shapes.shapes import Capsule, ConvexHull, Mesh, Points, Sphere
+from collision_monitor.shapes.registry import Capsule, ConvexHull, Mesh, Points, Sphere
 
 Array = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from collision_monitor.query.contact.nearest_or_deepest import (
 from collision_monitor.query.posed import Posed, pose_in_world
 from collision_monitor.records import Model
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Shape
+from collision_monitor.shapes.registry import Shape
 
 
 def distance_of_fillings(a: Posed, b: Posed) -> float:

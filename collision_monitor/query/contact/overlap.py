@@ -18,7 +18,7 @@ from collision_monitor.query.contact.mesh_pairs import mesh_overlap
 from collision_monitor.shapes.compound import shape_pairs
 from collision_monitor.shapes.planar import flat_pose
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, ConvexHull, Mesh, Polygon, Shape
+from collision_monitor.shapes.registry import Box, ConvexHull, Mesh, Polygon, Shape
 
 TESTS: Final = ("contact", "cascade", "sat", "edges")
 

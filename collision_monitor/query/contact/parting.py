@@ -13,7 +13,7 @@ from collision_monitor.meshes.trees.shape_trees import shape_tree
 from collision_monitor.query.posed import Posed
 from collision_monitor.shapes.planar import is_planar
 from collision_monitor.shapes.reach import reach
-from collision_monitor.shapes.shapes import HalfSpace, Mesh, Points
+from collision_monitor.shapes.registry import HalfSpace, Mesh, Points
 
 Array = NDArray[np.float64]
 

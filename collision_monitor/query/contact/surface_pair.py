@@ -14,7 +14,7 @@ from collision_monitor.impact.mesh_contact import mesh_contacts
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE
 from collision_monitor.query.pair_table import pair_table
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Points, Shape
+from collision_monitor.shapes.registry import Points, Shape
 
 Array = NDArray[np.float64]
 

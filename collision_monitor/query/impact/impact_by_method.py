@@ -16,7 +16,7 @@ from collision_monitor.query.impact.moving_pair import MotionQuery, lay_out_pair
 from collision_monitor.query.impact.time_of_impact import Impact
 from collision_monitor.records import Method
 from collision_monitor.shapes.pose import Motion
-from collision_monitor.shapes.shapes import HalfSpace
+from collision_monitor.shapes.registry import HalfSpace
 from collision_monitor.tolerances import GJK_TOUCHING
 
 MOST_STEPS: Final = 1_000_000

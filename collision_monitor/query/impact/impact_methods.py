@@ -29,7 +29,7 @@ from collision_monitor.query.impact.moving_pair import (
 )
 from collision_monitor.query.impact.time_of_impact import ITERATIONS
 from collision_monitor.shapes.pose import Motion, Pose, rotation_matrix
-from collision_monitor.shapes.shapes import Box, HalfSpace, Shape, Sphere
+from collision_monitor.shapes.registry import Box, HalfSpace, Shape, Sphere
 from collision_monitor.tolerances import PARALLEL_SIN2
 
 Array = NDArray[np.float64]

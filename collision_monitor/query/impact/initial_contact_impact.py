@@ -23,7 +23,7 @@ from collision_monitor.query.contact.contact import contact
 from collision_monitor.query.impact.moving_pair import MotionQuery, MovingShape, first_impacts, lay_out_pair
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.reach import reach
-from collision_monitor.shapes.shapes import Capsule, Circle, Cone, Cylinder, Sphere
+from collision_monitor.shapes.registry import kind_of
 
 Array = NDArray[np.float64]
 
@@ -157,10 +157,9 @@ class _Piece:
 
     def _is_round_about(self, axis: Array) -> bool:
         """Whether a rotation about the axis (3,) through its own origin leaves the piece unchanged."""
-        own = isinstance(self.shape, Capsule | Cylinder | Cone)
-        return isinstance(self.shape, Sphere | Circle) or (
-            own and float(np.linalg.norm(np.cross(self.rotation[:, 2], axis))) <= ALIGNED
-        )
+        kind = kind_of(self.shape)
+        along = float(np.linalg.norm(np.cross(self.rotation[:, 2], axis))) <= ALIGNED
+        return kind.ball or (kind.revolved and along)
 
 
 def _parting_time(a: _Piece, b: _Piece, n: Array, query: MotionQuery, round_off: float) -> float:

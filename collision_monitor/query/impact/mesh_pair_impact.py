@@ -23,7 +23,7 @@ from collision_monitor.query.impact.pair_impact_rows import set_motion
 from collision_monitor.query.packed import load_pair, packed_motion, packed_shape
 from collision_monitor.query.pair_table import pair_table
 from collision_monitor.shapes.pose import Motion
-from collision_monitor.shapes.shapes import Shape
+from collision_monitor.shapes.registry import Shape
 from collision_monitor.tolerances import GJK_TOUCHING
 
 

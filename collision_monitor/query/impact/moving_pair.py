@@ -26,8 +26,8 @@ from collision_monitor.shapes.forest import Forest
 from collision_monitor.shapes.planar import flat_pose, is_planar
 from collision_monitor.shapes.pose import Motion, Pose
 from collision_monitor.shapes.reach import reach
+from collision_monitor.shapes.registry import HalfSpace, Mesh, Points, Shape, Sphere, Triangle
 from collision_monitor.shapes.shape_table import ShapeTableBuilder
-from collision_monitor.shapes.shapes import HalfSpace, Mesh, Points, Shape, Sphere, Triangle
 
 MANY_FACES: Final = 100
 """Faces of a mesh from which on only those near the other object are followed one by one, and the rest as one mesh.

@@ -16,7 +16,7 @@ from collision_monitor.motion.motion import quaternion_to_matrix
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE, DISTANCE
 from collision_monitor.query.contact.contact_rows import write_contact
 from collision_monitor.query.packed import fits, load_pair
-from collision_monitor.shapes.shape_table import SPHERE
+from collision_monitor.shapes.kinds.sphere import SPHERE
 from collision_monitor.tolerances import GJK_TOUCHING
 
 DECIDED: Final = 0

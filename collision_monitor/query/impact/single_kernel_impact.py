@@ -15,7 +15,7 @@ from collision_monitor.query.contact.open_gap import may_be_inside
 from collision_monitor.query.impact.mesh_pair_impact import first_mesh_impact, impact_in_hulls, mesh_impact_of_faces
 from collision_monitor.query.impact.moving_pair import MotionQuery
 from collision_monitor.shapes.pose import Motion, Pose
-from collision_monitor.shapes.shapes import Mesh, Shape
+from collision_monitor.shapes.registry import Mesh, Shape
 from collision_monitor.tolerances import GJK_TOUCHING
 
 _HERE: Final = Pose()

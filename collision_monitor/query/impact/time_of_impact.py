@@ -31,7 +31,7 @@ from collision_monitor.query.impact.single_kernel_impact import quick_open_impac
 from collision_monitor.records import Method
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
 from collision_monitor.shapes.pose import Motion
-from collision_monitor.shapes.shapes import HalfSpace, Mesh, Sphere
+from collision_monitor.shapes.registry import HalfSpace, Mesh, Sphere
 from collision_monitor.tolerances import GJK_TOUCHING
 
 ITERATIONS: Final = 1000

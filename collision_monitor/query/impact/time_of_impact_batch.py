@@ -32,7 +32,7 @@ from collision_monitor.query.impact.time_of_impact import (
 from collision_monitor.query.pair_arrays import PackedShapes
 from collision_monitor.shapes.planar import is_planar
 from collision_monitor.shapes.pose import Motion, Pose
-from collision_monitor.shapes.shapes import HalfSpace, Mesh, Points
+from collision_monitor.shapes.registry import HalfSpace, Mesh, Points
 from collision_monitor.tolerances import GJK_TOUCHING, LARGEST_INPUT, UNIT_QUATERNION
 
 Array = NDArray[np.float64]

@@ -10,7 +10,7 @@ from collision_monitor.objects.models import containing_kdop
 from collision_monitor.query.arguments import Compound
 from collision_monitor.shapes.compound import shape_pairs
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Shape
+from collision_monitor.shapes.registry import Shape
 
 
 class Enclosure(NamedTuple):

@@ -12,7 +12,7 @@ from collision_monitor.query.contact.surface_pair import points_near
 from collision_monitor.shapes.compound import shape_pairs
 from collision_monitor.shapes.planar import is_planar
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Points
+from collision_monitor.shapes.registry import Points
 
 
 def points_within(

@@ -14,7 +14,7 @@ from collision_monitor.monitor.result import StepResult
 from collision_monitor.pipeline.catalogue import Catalogue
 from collision_monitor.ros.monitor.marker_bytes import Color, Kind, Marker, encode
 from collision_monitor.shapes.pose import Pose, rotation_matrix
-from collision_monitor.shapes.surfaces import surface_triangles
+from collision_monitor.shapes.registry import kind_of
 
 _STATIC: Final[Color] = (0.55, 0.57, 0.60, 0.35)
 _CALM: Final[Color] = (0.35, 0.55, 0.85, 0.9)
@@ -65,7 +65,7 @@ class MarkerView:
             it = self._catalogue.descriptions[object_id]
             self._surfaces.pop(object_id, None)
             self._static.pop(object_id, None)
-            corners = [_placed(surface_triangles(shape).reshape(-1, 3), pose) for shape, pose in it.shapes]
+            corners = [_placed(kind_of(shape).triangles(shape).reshape(-1, 3), pose) for shape, pose in it.shapes]
             vertices = np.concatenate(corners)
             if it.static and it.pose is not None:
                 self._static[object_id] = _placed(vertices, it.pose)

@@ -10,7 +10,7 @@ from typing import Any, Final
 from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Shape
+from collision_monitor.shapes.registry import Shape
 from collision_monitor.sources.ground.yaml_table import SHAPES, known, number, pose, shape, table, text, truth
 
 PLACE: Final = ("topic", "type", "frame", "marker", "static", "pose")

@@ -9,7 +9,7 @@ from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.polygons import is_convex
 from collision_monitor.geometry.triangulation import convex_parts
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import ConvexHull, Polygon, Shape
+from collision_monitor.shapes.registry import ConvexHull, Polygon, Shape
 
 Floats = NDArray[np.float64]
 

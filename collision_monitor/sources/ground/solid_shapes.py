@@ -7,7 +7,7 @@ from typing import Any, Final
 import numpy as np
 
 from collision_monitor.errors import InputError
-from collision_monitor.shapes.shapes import Box, Capsule, Cone, Cylinder, HalfSpace, Mesh, Shape, Sphere
+from collision_monitor.shapes.registry import Box, Cone, Cylinder, HalfSpace, Mesh, Shape, Sphere, kind_of
 from collision_monitor.sources.ground.prisms import prism
 
 _DIMENSIONS: Final = {1: 3, 2: 1, 3: 2, 4: 2, 5: 1}
@@ -52,14 +52,6 @@ def plane_shape(plane: Any) -> Shape:
 
 def scaled_shape(shape: Shape, factor: float) -> Shape:
     """Return a shape scaled about its origin, a mesh about the mean of its vertices. Raises ShapeError."""
-    match shape:
-        case Box(size):
-            return Box([factor * s for s in size])
-        case Sphere(radius):
-            return Sphere(factor * radius)
-        case Cylinder(radius, length) | Capsule(radius, length) | Cone(radius, length):
-            return type(shape)(factor * radius, factor * length)
-        case Mesh(vertices, faces):
-            centre = vertices.mean(axis=0)
-            return Mesh(centre + factor * (vertices - centre), faces)
-    raise InputError(f"scale: expected a shape of a URDF, got {type(shape).__name__}")
+    if (scaled := kind_of(shape).scaled) is None:
+        raise InputError(f"scale: expected a shape of a URDF, got {type(shape).__name__}")
+    return scaled(shape, factor)

@@ -13,7 +13,7 @@ from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.records import ShapeType
 from collision_monitor.settings.names import nearest_name
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Shape
+from collision_monitor.shapes.registry import Shape
 
 BY_VERTICES = ("convex_hull", "polygon")
 SHAPES = tuple(kind.name.lower() for kind in ShapeType if kind not in (ShapeType.MESH, ShapeType.POINTS))

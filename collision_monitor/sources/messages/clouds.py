@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.query.points.points_within import points_within
+from collision_monitor.shapes.kinds.points import MOST_CLOUD_POINTS
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import MOST_CLOUD_POINTS, Points
+from collision_monitor.shapes.registry import Points
 from collision_monitor.sources.ground.frames import frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry

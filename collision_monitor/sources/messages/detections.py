@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.records import StateFlag
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box
+from collision_monitor.shapes.registry import Box
 from collision_monitor.sources.ground.covariances import usable_blocks
 from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping

@@ -8,7 +8,7 @@ from typing import Any, Final
 from collision_monitor.errors import CollisionMonitorError, InputError, UnsupportedError
 from collision_monitor.records import StateFlag
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, Cylinder, Shape, Sphere
+from collision_monitor.shapes.registry import Box, Cylinder, Shape, Sphere
 from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.shapes.pose import Pose, multiply, rotation_matrix
-from collision_monitor.shapes.shapes import Shape
+from collision_monitor.shapes.registry import Shape
 from collision_monitor.sources.ground.scene_states import empty_states
 
 Floats = NDArray[np.float64]

@@ -11,7 +11,7 @@ import numpy as np
 
 from collision_monitor.errors import InputError
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Shape
+from collision_monitor.shapes.registry import Shape
 from collision_monitor.sources.ground.frames import frame_name
 from collision_monitor.sources.ground.solid_shapes import mesh_shape, plane_shape, primitive_shapes
 

@@ -13,7 +13,7 @@ from typing import Final
 from collision_monitor._jit import device, inlined
 from collision_monitor.motion.bodies import place_shape
 from collision_monitor.narrow_phase.core import rounding
-from collision_monitor.narrow_phase.support_value import core_support
+from collision_monitor.shapes.calls import core_support
 
 AXES: Final = 8
 """Half of them are from samples that passed, half from samples that met. Each more costs 2 ns per sample."""

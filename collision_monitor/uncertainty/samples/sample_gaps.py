@@ -20,18 +20,15 @@ from numpy import float32
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.narrow_phase.core import rounding
-from collision_monitor.narrow_phase.support_value import core_support
-from collision_monitor.shapes.shape_table import (
-    BOX,
-    CAPSULE,
-    CIRCLE,
-    CONE,
-    CONVEX_HULL,
-    CYLINDER,
-    ELLIPSOID,
-    HALF_SPACE,
-    POLYGON,
-)
+from collision_monitor.shapes.calls import core_support
+from collision_monitor.shapes.kinds.box import BOX
+from collision_monitor.shapes.kinds.capsule import CAPSULE
+from collision_monitor.shapes.kinds.circle import CIRCLE
+from collision_monitor.shapes.kinds.convex_hull import CONVEX_HULL
+from collision_monitor.shapes.kinds.cylinder import CYLINDER
+from collision_monitor.shapes.kinds.half_space import HALF_SPACE
+from collision_monitor.shapes.kinds.polygon import POLYGON
+from collision_monitor.shapes.kinds.sphere import SPHERE
 from collision_monitor.uncertainty.linear_gaps import add_reach, begin_terms, is_linear, make_terms, sum_terms
 from collision_monitor.uncertainty.obstacle_planes import AT_REST, BENDS, MODE, from_plane
 from collision_monitor.uncertainty.samples.error_samples import LEFT_OVER, ORIENTATION
@@ -214,14 +211,6 @@ def _subtract_reaches(table, s, R, o, sign, local, gap, first, last, best):
         height = s1 if kind == CYLINDER else ZERO
         for n in range(gap.size):
             gap[n] -= abs(z[n]) * height + s0 * sqrt(x[n] * x[n] + y[n] * y[n])
-    elif kind == CONE:
-        for n in range(gap.size):
-            top, rim = z[n] * s1, s0 * sqrt(x[n] * x[n] + y[n] * y[n]) - z[n] * s1
-            gap[n] -= top if top > rim else rim
-    elif kind == ELLIPSOID:
-        for n in range(gap.size):
-            u, v, w = x[n] * s0, y[n] * s1, z[n] * s2
-            gap[n] -= sqrt(u * u + v * v + w * w)
     elif kind == CONVEX_HULL or kind == POLYGON:
         for n in range(gap.size):
             best[n] = -inf
@@ -233,6 +222,9 @@ def _subtract_reaches(table, s, R, o, sign, local, gap, first, last, best):
                 best[n] = value if value > best[n] else best[n]
         for n in range(gap.size):
             gap[n] -= best[n]
+    elif kind != SPHERE:  # the rarer kinds, in double precision
+        for n in range(gap.size):
+            gap[n] -= float32(core_support(table, s, float(x[n]), float(y[n]), float(z[n])))
 
 
 @inlined

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.shapes.shapes import Sphere
+from collision_monitor.shapes.registry import Sphere
 from collision_monitor.world.hard_spheres.simulation import HardSpheres
 from collision_monitor.world.rigid.walls import closed_box
 from collision_monitor.world.scene import Scene, States, object_count, positive_rate, state_array

@@ -14,8 +14,8 @@ from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.response.contact_set import Bodies, Contacts
 from collision_monitor.response.mass import mass_properties
 from collision_monitor.shapes.pose import from_rotation_vector, multiply, rotation_matrix
+from collision_monitor.shapes.registry import Box, Sphere
 from collision_monitor.shapes.shape_table import ShapeTableBuilder
-from collision_monitor.shapes.shapes import Box, Sphere
 from collision_monitor.world.rigid.box_contacts import MOST_CORNERS, face_contacts
 
 Array = NDArray[np.float64]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, Sphere
+from collision_monitor.shapes.registry import Box, Sphere
 from collision_monitor.world.rigid.impulse_response import PARTS
 from collision_monitor.world.rigid.response_choice import ResponseOptions
 from collision_monitor.world.rigid.responses import make_response

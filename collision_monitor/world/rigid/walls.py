@@ -8,7 +8,7 @@ import numpy as np
 
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box
+from collision_monitor.shapes.registry import Box
 
 THICKNESS: Final = 0.2
 """Thickness of the walls (m)."""

@@ -22,7 +22,7 @@ from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import PredictionStatus
 from collision_monitor.settings.profile import Profile
-from collision_monitor.shapes.shapes import Sphere
+from collision_monitor.shapes.registry import Sphere
 from collision_monitor.world.scene import state_array
 
 GOLDEN = Path(__file__).parents[2] / "golden" / "balanced.mcap"

@@ -31,7 +31,7 @@ from collision_monitor.errors import InputError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, ConvexHull, HalfSpace, Sphere
+from collision_monitor.shapes.registry import Box, ConvexHull, HalfSpace, Sphere
 from collision_monitor.world.scene import state_array
 
 GOLDEN = Path(__file__).parents[2] / "golden" / "balanced.mcap"

@@ -9,7 +9,7 @@ from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.records import Phase
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose, from_rotation_vector
-from collision_monitor.shapes.shapes import Box, Capsule, Cylinder, HalfSpace, Sphere
+from collision_monitor.shapes.registry import Box, Capsule, Cylinder, HalfSpace, Sphere
 
 TOLERANCE, RATE = 2e-3, 50.0
 SHAPES = (Box((0.5, 0.4, 0.3)), Capsule(0.15, 0.4), Cylinder(0.2, 0.4), Sphere(0.25), [(Box((0.4,) * 3), Pose())] * 2)

@@ -8,7 +8,7 @@ import pytest
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import from_rotation_vector
-from collision_monitor.shapes.shapes import Box, Mesh
+from collision_monitor.shapes.registry import Box, Mesh
 from collision_monitor.world.arm import link
 
 RATE, COUNT = 50.0, 18

@@ -14,7 +14,7 @@ from collision_monitor.monitor.result import StepResult
 from collision_monitor.records import ContactStatus, Model, Phase
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose, from_rotation_vector, multiply
-from collision_monitor.shapes.shapes import Box, Capsule, ConvexHull, HalfSpace, Polygon, Sphere
+from collision_monitor.shapes.registry import Box, Capsule, ConvexHull, HalfSpace, Polygon, Sphere
 from collision_monitor.world import make_scene
 
 BOX = Box((0.8, 0.6, 0.4))

@@ -10,11 +10,11 @@ from collision_monitor.impact.body_contact import RESULT, ContactQuery, body_con
 from collision_monitor.impact.body_impact import make_scratch
 from collision_monitor.monitor.contacts.plain_contacts import plain_contact
 from collision_monitor.monitor.monitor import Monitor
-from collision_monitor.narrow_phase.contact_row import UNKNOWN
 from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile
+from collision_monitor.shapes.feature_types import UNKNOWN
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, Capsule, ConvexHull, Cylinder, Ellipsoid, HalfSpace, Sphere
+from collision_monitor.shapes.registry import Box, Capsule, ConvexHull, Cylinder, Ellipsoid, HalfSpace, Sphere
 
 FEATURES = ("feature_type_a", "feature_type_b", "feature_index_a", "feature_index_b")
 POINTS = ("point_a", "point_b", "closing_speed")

@@ -17,7 +17,7 @@ from collision_monitor.monitor.result import StepResult
 from collision_monitor.monitor.state.snapshot import Snapshot
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Sphere
+from collision_monitor.shapes.registry import Sphere
 
 MILLISECOND = 1_000_000
 SECOND = 1_000_000_000

@@ -12,8 +12,8 @@ from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.query.contact.nearest_pieces import ALL_PAIRS, NearestPieces
 from collision_monitor.query.piece_table import PieceTable, exact_piece_table, piece_table
 from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.registry import Box, Capsule, Circle, HalfSpace, Mesh, Polygon, Sphere
 from collision_monitor.shapes.shape_table import join
-from collision_monitor.shapes.shapes import Box, Capsule, Circle, HalfSpace, Mesh, Polygon, Sphere
 
 
 def torus(major: int, minor: int) -> Mesh:

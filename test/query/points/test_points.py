@@ -8,7 +8,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 import collision_monitor as cm
-from collision_monitor.shapes.shapes import MOST_CLOUD_POINTS
+from collision_monitor.shapes.kinds.points import MOST_CLOUD_POINTS
 
 TORUS = trimesh.creation.torus(1.0, 0.35, major_sections=14, minor_sections=8)
 BALL = trimesh.creation.icosphere(1)

@@ -17,7 +17,7 @@ from std_msgs.msg import String
 
 from collision_monitor import records
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.shapes.shapes import Cylinder
+from collision_monitor.shapes.registry import Cylinder
 
 RULES = Path(__file__).parents[3] / "config/guard_rules.yaml"
 PROGRAM = "import sys; from collision_monitor.ros.executables import guard; sys.exit(guard())"

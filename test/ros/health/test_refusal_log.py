@@ -12,7 +12,7 @@ from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.ros.health.refusal_log import PERIOD, RefusalLog
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Sphere
+from collision_monitor.shapes.registry import Sphere
 
 SECOND = 1_000_000_000
 BALL = ((Sphere(0.5), Pose()),)

@@ -12,7 +12,7 @@ from rclpy.qos import LivelinessPolicy, QoSProfile
 
 from collision_monitor import records
 from collision_monitor.objects.description import ObjectDescription
-from collision_monitor.shapes.shapes import Sphere
+from collision_monitor.shapes.registry import Sphere
 from collision_monitor_msgs.msg import PredictedCollisionArray
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR

@@ -13,7 +13,7 @@ from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.pipeline.topics import Topic
 from collision_monitor.ros.endpoints import quality_of
 from collision_monitor.settings.profile import Profile
-from collision_monitor.shapes.shapes import Box
+from collision_monitor.shapes.registry import Box
 from collision_monitor_msgs.msg import ContactArray
 
 BOXES = [ObjectDescription(i, Box((1, 1, 1))) for i in (1, 2)]

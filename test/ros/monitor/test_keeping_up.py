@@ -15,7 +15,7 @@ from collision_monitor.session import Session
 from collision_monitor.session.replaying.replay import replay
 from collision_monitor.session.replaying.replay_report import Verdict
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box
+from collision_monitor.shapes.registry import Box
 
 CUBES = 32
 MOST = 1000

@@ -15,7 +15,7 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session import Session
 from collision_monitor.session.replaying.replay import replay
 from collision_monitor.session.replaying.replay_report import Verdict
-from collision_monitor.shapes.shapes import Sphere
+from collision_monitor.shapes.registry import Sphere
 
 START = 60.0
 MANAGED = ("--ros-args", "-p", "autostart:=false")

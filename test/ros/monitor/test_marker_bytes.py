@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
+from collision_monitor.shapes.surfaces import surface_triangles
 from rclpy.serialization import deserialize_message
 from visualization_msgs.msg import Marker as RosMarker
 from visualization_msgs.msg import MarkerArray
 
 from collision_monitor.ros.monitor.marker_bytes import Kind, Marker, encode
-from collision_monitor.shapes.shapes import (
+from collision_monitor.shapes.registry import (
     Box,
     Capsule,
     Circle,
@@ -20,7 +21,6 @@ from collision_monitor.shapes.shapes import (
     Polygon,
     Sphere,
 )
-from collision_monitor.shapes.surfaces import surface_triangles
 
 
 def test_rclpy_reads_what_was_written():

@@ -7,7 +7,7 @@ from collision_monitor.codec import encode_descriptions, encode_states
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.ros.monitor.markers import MarkerView
-from collision_monitor.shapes.shapes import Sphere
+from collision_monitor.shapes.registry import Sphere
 
 
 def test_states_of_unknown_objects_leave_nothing():

@@ -19,7 +19,7 @@ from collision_monitor.pipeline.topics import Topic
 from collision_monitor.ros.endpoints import subscription
 from collision_monitor.session import Session
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, Sphere
+from collision_monitor.shapes.registry import Box, Sphere
 from collision_monitor.view.topic_content import TopicContent
 
 SOURCES = """

@@ -10,7 +10,7 @@ from collision_monitor import records
 from collision_monitor.codec import decode_contacts, decode_descriptions
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session import Session
-from collision_monitor.shapes.shapes import Box
+from collision_monitor.shapes.registry import Box
 from collision_monitor_msgs.msg import MonitorStatus
 
 

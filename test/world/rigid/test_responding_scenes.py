@@ -8,7 +8,7 @@ import pytest
 from collision_monitor.errors import InputError
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import Box, Sphere
+from collision_monitor.shapes.registry import Box, Sphere
 from collision_monitor.world import make_scene
 from collision_monitor.world.rigid.impulse_response import ImpulseResponse
 from collision_monitor.world.rigid.penalty_response import PenaltyResponse

@@ -1,0 +1,1 @@
+"""The kinds of shapes, one file each; the file is named after its class, as truncated_cone.py after TruncatedCone."""
