@@ -90,12 +90,12 @@ def _view_session(args: argparse.Namespace, stop: StopRequest) -> None:
     from collision_monitor.session import Session
     from collision_monitor.view.player import Player
     from collision_monitor.view.player_controls import PlayerControls
-    from collision_monitor.view.recording import Recording
+    from collision_monitor.view.recording import RecordedSteps
     from collision_monitor.view.view import PERIOD, View
 
     session = Session(args.session)
     with stop.ending(), session_bar("view", session) as progress:
-        recording = Recording(session, args.replay, progress)
+        recording = RecordedSteps(session, args.replay, progress)
     server = start_server(args.host, args.port)
     view = View(server)
     player = Player(recording.times[-1])

@@ -21,6 +21,6 @@ def mass_properties(shape: Shape, density: float = 1000.0) -> MassProperties:
     if found is None:
         solids = ", ".join(kind.shape.__name__ for kind in KINDS if kind.mass is not None)
         raise UnsupportedError(
-            f"{type(shape).__name__} has no mass properties; supported are {solids}, if they have a volume and are closed"
+            f"{type(shape).__name__} has no mass properties; supported are {solids}, with a volume"
         )
     return found

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from collision_monitor.session.reader import Recorded as Recorded
     from collision_monitor.session.reader import Session as Session
     from collision_monitor.session.recording.recorder import Recorder as Recorder
-    from collision_monitor.session.recording.recording_state import RecordingState as RecordingState
+    from collision_monitor.session.recording.recording_state import Recording as Recording
     from collision_monitor.session.recording.splitting import ONE_FILE as ONE_FILE
     from collision_monitor.session.recording.splitting import Splitting as Splitting
 

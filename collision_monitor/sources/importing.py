@@ -16,7 +16,7 @@ from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.pipeline.topics import NODE, RECORDED, STATUS_PERIOD, Topic
 from collision_monitor.session.output_file import check_recording
 from collision_monitor.session.recording.recorder import Recorder
-from collision_monitor.session.recording.recording_state import RecordingState
+from collision_monitor.session.recording.recording_state import Recording
 from collision_monitor.settings.profile import Profile
 from collision_monitor.sources.bag import Bag
 from collision_monitor.sources.decoding import Decoder
@@ -106,7 +106,7 @@ def _write(
         raise
     recorder.close()
     status = recorder.status()
-    if status["recording"] == RecordingState.FAILED:
+    if status["recording"] == Recording.FAILED:
         _remove(target)
         raise SessionError(str(status["recording_error"]))
     result.refused = {reason.value: count for reason, count in pipeline.monitor.refused.items() if count}

@@ -10,7 +10,7 @@ from collision_monitor.settings.names import shortened
 from collision_monitor.view.pair_list import LONGEST_NAME
 from collision_monitor.view.panel import Request
 from collision_monitor.view.player import Player
-from collision_monitor.view.recording import Beginning, Recording
+from collision_monitor.view.recording import Beginning, RecordedSteps
 
 if TYPE_CHECKING:
     import viser
@@ -29,7 +29,7 @@ class PlayerControls:
     """The controls of a player."""
 
     def __init__(
-        self, server: viser.ViserServer, recording: Recording, player: Player, requests: SimpleQueue[Request]
+        self, server: viser.ViserServer, recording: RecordedSteps, player: Player, requests: SimpleQueue[Request]
     ) -> None:
         self._recording, self._player, self._requests = recording, player, requests
         self._shown = 0.0

@@ -44,7 +44,7 @@ class Beginning(NamedTuple):
     pair: Pair
 
 
-class Recording:
+class RecordedSteps:
     """The steps of a session.
 
     times: s from the first one, never falling. begins: the contacts that begin. names: of all objects, by id.

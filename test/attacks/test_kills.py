@@ -19,7 +19,7 @@ from session_scene import CONTACTS, PREDICTIONS, STATES, TYPES, inputs
 
 from collision_monitor.codec import decode_contacts
 from collision_monitor.pipeline.pipeline import Pipeline
-from collision_monitor.session import Recorder, RecordingState, Session
+from collision_monitor.session import Recorder, Recording, Session
 from collision_monitor.session.mcap.salvage import salvage
 from collision_monitor.session.replaying.replay import replay
 from collision_monitor.session.replaying.replay_report import Verdict
@@ -133,7 +133,7 @@ def test_a_disk_that_stalls_delays_no_step_and_what_it_cost_is_counted(tmp_path:
     recorder.close()
     status = recorder.status()
     assert stalled > 50
-    assert (status["recording"], status["recording_error"]) == (RecordingState.ON, "")
+    assert (status["recording"], status["recording_error"]) == (Recording.ON, "")
     session = Session(path)
     sequences = [message.sequence for message in session.messages()]
     assert session.damage == []

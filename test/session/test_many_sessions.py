@@ -33,9 +33,9 @@ def failed(path: Path, why: str) -> str:
 def importable_by_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Put this module where a spawned process finds it; pytest's import mode leaves it out of `sys.path`."""
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
-    monkeypatch.setattr(work, "__module__", "test_many")
-    monkeypatch.setattr(failed, "__module__", "test_many")
-    monkeypatch.setitem(sys.modules, "test_many", sys.modules[__name__])
+    monkeypatch.setattr(work, "__module__", "test_many_sessions")
+    monkeypatch.setattr(failed, "__module__", "test_many_sessions")
+    monkeypatch.setitem(sys.modules, "test_many_sessions", sys.modules[__name__])
 
 
 def test_one_that_breaks_does_not_stop_the_others() -> None:

@@ -15,7 +15,7 @@ from collision_monitor.session import Recorder, Session
 from collision_monitor.shapes.registry import Sphere
 from collision_monitor.view.levels import COLORS, Level
 from collision_monitor.view.picture import Role, draw
-from collision_monitor.view.recording import Recording
+from collision_monitor.view.recording import RecordedSteps
 from collision_monitor.view.topic_content import TopicContent
 
 OBJECTS = [ObjectDescription(1, Sphere(0.5), name="cart 1"), ObjectDescription(2, Sphere(0.3), name="person 2")]
@@ -52,7 +52,7 @@ def record(path: Path, rules: Rules, steps: int = 60) -> dict[int, int]:
 def test_a_session_shows_its_alerts_back_and_forth(tmp_path: Path) -> None:
     levels = record(tmp_path / "a.mcap", RULES)
     assert set(levels.values()) == {0, 1, 3}
-    recording, replayed = Recording(Session(tmp_path / "a.mcap")), Recording(Session(tmp_path / "a.mcap"), "")
+    recording, replayed = RecordedSteps(Session(tmp_path / "a.mcap")), RecordedSteps(Session(tmp_path / "a.mcap"), "")
     colors = {0: Level.CLEAR, 1: Level.CAUTION, 3: Level.CRITICAL}
     for k in [59, 0, *np.random.default_rng(1).permutation(60).tolist()]:
         moment = recording.moment(k)
@@ -64,7 +64,7 @@ def test_a_session_shows_its_alerts_back_and_forth(tmp_path: Path) -> None:
 
 def test_a_session_without_rules_is_coloured_by_the_answers(tmp_path: Path) -> None:
     record(tmp_path / "a.mcap", Rules(), steps=3)
-    assert Recording(Session(tmp_path / "a.mcap")).moment(2).alerts is None
+    assert RecordedSteps(Session(tmp_path / "a.mcap")).moment(2).alerts is None
 
 
 def test_live_alerts_hold_as_long_as_they_are_repeated() -> None:

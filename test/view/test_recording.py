@@ -16,7 +16,7 @@ from collision_monitor.errors import SessionError
 from collision_monitor.session import Session
 from collision_monitor.settings.profile import Profile
 from collision_monitor.view.picture import Picture, Role, draw
-from collision_monitor.view.recording import APART, Recording
+from collision_monitor.view.recording import APART, RecordedSteps
 
 
 @dataclass
@@ -87,7 +87,7 @@ def assert_shows(picture: Picture, step: Step) -> None:
 
 def test_the_page_shows_what_the_messages_say_back_and_forth(golden: Path) -> None:
     expected = steps_of(golden)
-    recording = Recording(Session(golden))
+    recording = RecordedSteps(Session(golden))
     assert len(recording) == len(expected) == 300
     assert recording.times == pytest.approx([(step.stamp - expected[0].stamp) * 1e-9 for step in expected])
     order = np.random.default_rng(3).integers(0, 300, 60).tolist()
@@ -96,7 +96,7 @@ def test_the_page_shows_what_the_messages_say_back_and_forth(golden: Path) -> No
 
 
 def test_a_moment_does_not_depend_on_the_way_to_it(golden: Path) -> None:
-    straight, jumping = Recording(Session(golden)), Recording(Session(golden))
+    straight, jumping = RecordedSteps(Session(golden)), RecordedSteps(Session(golden))
     for frame in (250, 30, 31, 249, 64, 63, 29):
         far = jumping.moment(frame)
         for k in range(frame + 1) if frame < 32 else (frame,):
@@ -106,7 +106,7 @@ def test_a_moment_does_not_depend_on_the_way_to_it(golden: Path) -> None:
 
 
 def test_beginning_contacts_and_times_are_found(drive: Path) -> None:
-    recording = Recording(Session(drive))
+    recording = RecordedSteps(Session(drive))
     (begin,) = recording.begins
     assert begin.pair == (1, 2)
     assert recording.times[begin.frame] == pytest.approx(1.5, abs=0.03)
@@ -118,7 +118,7 @@ def test_beginning_contacts_and_times_are_found(drive: Path) -> None:
 
 def test_a_replay_shows_the_answers_of_another_profile(drive: Path) -> None:
     profile = Profile.named("exact").replace(horizon=0.75)
-    recorded, replayed = Recording(Session(drive)), Recording(Session(drive), profile)
+    recorded, replayed = RecordedSteps(Session(drive)), RecordedSteps(Session(drive), profile)
     assert len(recorded) == len(replayed)
     ours, theirs = recorded.moment(0), replayed.moment(0)
     assert ours.state.tobytes() == theirs.state.tobytes()
@@ -128,12 +128,12 @@ def test_a_replay_shows_the_answers_of_another_profile(drive: Path) -> None:
 
 def test_without_answers_nothing_is_shown_as_clear(tmp_path: Path) -> None:
     path = record_states(tmp_path / "inputs.mcap", *drive_states(0.5), answers=False)
-    recording = Recording(Session(path))
+    recording = RecordedSteps(Session(path))
     assert len(recording) == 25 and "--replay" in recording.problems[0]
     picture = draw(recording.moment(10))
     assert not picture.is_known and not picture.rows
     moving = picture.batches[Role.MOVING, "box"]
-    answered = draw(Recording(Session(path), Profile.named("exact")).moment(10))
+    answered = draw(RecordedSteps(Session(path), Profile.named("exact")).moment(10))
     assert (moving.color != answered.batches[Role.MOVING, "box"].color).any()
 
 
@@ -147,7 +147,7 @@ def test_a_session_without_shapes_shows_the_pairs(tmp_path: Path, golden: Path) 
         for message in session.messages():
             if message.type != "ObjectDescriptionArray":
                 recorder.write(message.topic, message.data, message.log_time, message.publish_time)
-    recording = Recording(Session(tmp_path / "bare.mcap"))
+    recording = RecordedSteps(Session(tmp_path / "bare.mcap"))
     picture = draw(recording.moment(100))
     assert not picture.batches and picture.rows and picture.rows[0].names[0].startswith("body")
 
@@ -155,4 +155,4 @@ def test_a_session_without_shapes_shows_the_pairs(tmp_path: Path, golden: Path) 
 def test_an_empty_session_is_refused(tmp_path: Path) -> None:
     path = record_states(tmp_path / "empty.mcap", drive_states(0.1)[0], [])
     with pytest.raises(SessionError, match="expected object states, found none"):
-        Recording(Session(path))
+        RecordedSteps(Session(path))

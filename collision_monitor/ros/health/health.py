@@ -15,7 +15,7 @@ from typing import Final
 from collision_monitor.codec import MonitorStatus
 from collision_monitor.errors import Refusal
 from collision_monitor.ros.health.line_report import DiagnosticLevel, LineReport
-from collision_monitor.session import RecordingState
+from collision_monitor.session import Recording
 
 HISTORY: Final = 10
 """Reports over which counters are compared: a single refusal stays visible for about 10 s."""
@@ -211,12 +211,12 @@ def _steps(facts: NodeFacts, history: LastReports) -> Report:
 
 def _recording(status: MonitorStatus, history: LastReports) -> Report:
     findings = _Findings()
-    if status.recording == RecordingState.FAILED:
+    if status.recording == Recording.FAILED:
         findings.add(DiagnosticLevel.WARN, f"the recording failed, the monitoring goes on: {status.recording_error}")
     else:
         for count in history.increase(status, ["recording_dropped"]).values():
             findings.add(DiagnosticLevel.WARN, f"the disk is too slow: {count} messages dropped lately")
-    is_on = status.recording == RecordingState.ON
+    is_on = status.recording == Recording.ON
     names = ("recording_path", "recorded_messages", "recorded_bytes", "recording_dropped")
     values = {name: getattr(status, name) for name in names}
     return findings.report("recording", f"recording to {status.recording_path}" if is_on else "not recording", values)

@@ -6,7 +6,7 @@ import math
 
 from collision_monitor.codec import MonitorStatus
 from collision_monitor.errors import Refusal
-from collision_monitor.session import RecordingState
+from collision_monitor.session import Recording
 
 
 def status_line(status: MonitorStatus) -> str:
@@ -19,6 +19,6 @@ def status_line(status: MonitorStatus) -> str:
     refused = sum(getattr(status, f"refused_{reason.value}") for reason in Refusal)
     if refused:
         line += f", {refused} refused (last: {status.last_refusal})"
-    if status.recording == RecordingState.FAILED:
+    if status.recording == Recording.FAILED:
         line += f", recording failed: {status.recording_error}"
     return line

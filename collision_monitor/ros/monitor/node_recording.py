@@ -10,7 +10,7 @@ from rclpy.node import Node
 from collision_monitor.errors import SessionError
 from collision_monitor.monitor.state.snapshot import Snapshot
 from collision_monitor.pipeline.topics import RECORDED, Topic
-from collision_monitor.session import RecordingState, Splitting
+from collision_monitor.session import Recording, Splitting
 
 if TYPE_CHECKING:
     from collision_monitor.session import Recorder
@@ -43,7 +43,7 @@ class NodeRecording:
 
     def _fail(self, path: str, reason: str) -> None:
         self._logger.error(f"not recording: {reason}")
-        self._last = {"recording": RecordingState.FAILED, "recording_path": path, "recording_error": reason}
+        self._last = {"recording": Recording.FAILED, "recording_path": path, "recording_error": reason}
 
     def __str__(self) -> str:
         return f"recording to {self._recorder.path}" if self._recorder else "not recording"
@@ -73,8 +73,8 @@ class NodeRecording:
             return
         last, now = self._last, self._recorder.status()
         self._last = now
-        if now["recording"] == RecordingState.FAILED:  # from then on every message counts as dropped
-            if last.get("recording") != RecordingState.FAILED:
+        if now["recording"] == Recording.FAILED:  # from then on every message counts as dropped
+            if last.get("recording") != Recording.FAILED:
                 self._logger.error(f"the recording failed, the monitoring goes on: {now['recording_error']}")
         elif now["recording_dropped"] != last.get("recording_dropped", 0):
             self._logger.warning(

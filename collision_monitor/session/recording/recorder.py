@@ -16,7 +16,7 @@ from collision_monitor.session.mcap.layout import SEQUENCE_MASK
 from collision_monitor.session.mcap.rosbag2 import RECORDED_TYPES
 from collision_monitor.session.recording.queue_entry import QueueEntry
 from collision_monitor.session.recording.recording_files import SNAPSHOT_PERIOD, RecordingFiles
-from collision_monitor.session.recording.recording_state import RecordingState
+from collision_monitor.session.recording.recording_state import Recording
 from collision_monitor.session.recording.splitting import ONE_FILE, Splitting
 
 FLUSH_PERIOD: Final = 0.25
@@ -89,7 +89,7 @@ class Recorder:
         self._closing = False
         self._next_sequence = 0
         self._last_log_time = 0
-        self._state = RecordingState.ON
+        self._state = Recording.ON
         self._error = ""
         self._dropped = 0
         self._recorded = 0
@@ -134,11 +134,11 @@ class Recorder:
             fields = topic, data, self._last_log_time, max(0, publish_time), sequence, event, objects, None, settings
             entry = QueueEntry._make(fields)  # four times as fast as the constructor
             cost = entry.cost
-            while self._patient and self._state is RecordingState.ON and self._waiting + cost > self._queue_bytes:
+            while self._patient and self._state is Recording.ON and self._waiting + cost > self._queue_bytes:
                 self._wake.notify()
                 self._wake.wait(FLUSH_PERIOD)
             self._next_sequence += 1
-            if self._closing or self._state is RecordingState.FAILED or self._waiting + cost > self._queue_bytes:
+            if self._closing or self._state is Recording.FAILED or self._waiting + cost > self._queue_bytes:
                 self._dropped += 1
                 return
             self._queue.append(entry)
@@ -162,7 +162,7 @@ class Recorder:
             entry = QueueEntry("", b"", self._last_log_time, 0, sequence, snapshot=snapshot)
             if (
                 not self._closing
-                and self._state is RecordingState.ON
+                and self._state is Recording.ON
                 and self._waiting + entry.cost <= self._queue_bytes
             ):
                 self._queue.append(entry)
@@ -207,7 +207,7 @@ class Recorder:
         except Exception as error:  # no error may reach the caller; the status reports it
             reason = error.strerror if isinstance(error, OSError) and error.strerror else repr(error)
             with self._wake:
-                self._state = RecordingState.FAILED
+                self._state = Recording.FAILED
                 self._error = f"{self.path}: {reason}"
                 self._dropped = self._next_sequence - self._taken
                 self._queue.clear()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import IntEnum
 
 
-class RecordingState(IntEnum):
+class Recording(IntEnum):
     """Values of `MonitorStatus.recording`."""
 
     OFF = 0

@@ -14,7 +14,7 @@ from collision_monitor.impact.pair_impacts import predict_pairs
 from collision_monitor.meshes.distance.nearest import LEAST, MEMORY, answer_row, tree_distance
 from collision_monitor.meshes.distance.solid import MOST_EXAMINED
 from collision_monitor.meshes.trees.shape_trees import kept_tree
-from collision_monitor.query.contact.contact import deepest
+from collision_monitor.query.contact import nearest_or_deepest as deepest
 from collision_monitor.query.impact import initial_contact_impact as touching
 from collision_monitor.query.impact import moving_pair
 from collision_monitor.query.posed import Posed
@@ -77,9 +77,11 @@ def test_the_depth_of_more_slivers_than_are_examined_is_within_its_bound() -> No
 
 def test_points_are_not_located_in_a_soup_beyond_a_number_of_tests(monkeypatch: pytest.MonkeyPatch) -> None:
     located = []
-    locate = deepest.locate_in_surface
+    locate = deepest.locate_in_welded_surface
     monkeypatch.setattr(deepest, "MOST_TESTS", 4_000)
-    monkeypatch.setattr(deepest, "locate_in_surface", lambda own, surface: located.append(own) or locate(own, surface))
+    monkeypatch.setattr(
+        deepest, "locate_in_welded_surface", lambda own, surface: located.append(own) or locate(own, surface)
+    )
     mesh = soup(400)
     side = Posed([(mesh, Pose())], Pose(), [(mesh, Pose())])
     assert deepest.locate(side, side, np.zeros(3)) == UNKNOWN

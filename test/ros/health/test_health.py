@@ -10,7 +10,7 @@ import pytest
 from collision_monitor.codec import MonitorStatus
 from collision_monitor.ros.health.health import HISTORY, DiagnosticLevel, LastReports, NodeFacts, Report, reports
 from collision_monitor.ros.health.line_report import LineReport
-from collision_monitor.session import RecordingState
+from collision_monitor.session import Recording
 
 GOOD = {"step": 9, "objects": 3, "latency": 0.002, "rate": 50.0, "step_duration_p99": 0.001}
 
@@ -89,19 +89,19 @@ def test_all_is_well() -> None:
         ),
         (facts(other_nodes=1), "state", DiagnosticLevel.ERROR, "another node of this name"),
         (
-            facts({"recording": RecordingState.FAILED, "recording_error": "no space"}),
+            facts({"recording": Recording.FAILED, "recording_error": "no space"}),
             "recording",
             DiagnosticLevel.WARN,
             "the recording failed, the monitoring goes on: no space",
         ),
         (
-            facts({"recording": RecordingState.ON, "recording_dropped": 8}),
+            facts({"recording": Recording.ON, "recording_dropped": 8}),
             "recording",
             DiagnosticLevel.WARN,
             "the disk is too slow: 8 messages dropped lately",
         ),
         (
-            facts({"recording": RecordingState.ON, "recording_path": "a"}),
+            facts({"recording": Recording.ON, "recording_path": "a"}),
             "recording",
             DiagnosticLevel.OK,
             "recording to a",

@@ -16,7 +16,7 @@ import yaml
 from mcap.reader import make_reader
 
 from collision_monitor.errors import SessionError
-from collision_monitor.session import Recorder, RecordingState, Session
+from collision_monitor.session import Recorder, Recording, Session
 
 TYPES = {"/m/contacts": "ContactArray", "/m/status": "MonitorStatus"}
 METADATA = {"profile": "{}", "frame_id": "world"}
@@ -37,7 +37,7 @@ def test_messages_come_back_in_the_order_of_writing(tmp_path: Path) -> None:
     assert [m.topic for m in messages[:2]] == list(TYPES)
     assert [m.type for m in messages[:2]] == list(TYPES.values())
     assert recorder.status() == {
-        "recording": RecordingState.ON,
+        "recording": Recording.ON,
         "recorded_messages": 5,
         "recorded_bytes": path.stat().st_size,
         "recording_dropped": 0,
@@ -163,7 +163,7 @@ def test_a_full_disk_fails_the_recording_and_not_the_caller(tmp_path: Path) -> N
     assert run.returncode == 0, run.stderr
     assert run.stderr == ""
     state, recorded, dropped, error = run.stdout.strip().split(" ", 3)
-    assert int(state) == RecordingState.FAILED
+    assert int(state) == Recording.FAILED
     assert error == f"{path}: File too large"
     session = Session(path)
     assert len(list(session.messages())) >= int(recorded) > 0
@@ -179,10 +179,10 @@ def test_a_removed_recording_fails_once_and_not_the_caller(tmp_path: Path, name:
     with Recorder(folder / name, TYPES, METADATA) as recorder:
         recorder.write("/m/status", DATA, 1, 1)
         _until(lambda: recorder.status()["recorded_messages"] == 1)
-        assert recorder.status()["recording"] == RecordingState.ON
+        assert recorder.status()["recording"] == Recording.ON
         shutil.rmtree(folder)
         recorder.write("/m/status", DATA, 2, 2)
-        _until(lambda: recorder.status()["recording"] == RecordingState.FAILED)
+        _until(lambda: recorder.status()["recording"] == Recording.FAILED)
         error = f"{folder / name}: the file was removed or renamed during the recording"
         assert recorder.status()["recording_error"] == error
         recorder.write("/m/status", DATA, 3, 3)

@@ -15,7 +15,7 @@ from collision_monitor.cli.main import main
 from collision_monitor.codec import decode_contacts, decode_descriptions
 from collision_monitor.errors import SessionError
 from collision_monitor.records import Phase
-from collision_monitor.session import Recorded, RecordingState, Session, Splitting
+from collision_monitor.session import Recorded, Recording, Session, Splitting
 from collision_monitor.session.recording.event_window import EventWindow
 from collision_monitor.session.recording.queue_entry import QueueEntry
 from collision_monitor.session.replaying.replay import replay
@@ -120,7 +120,7 @@ def test_only_what_is_around_collisions_is_kept(recorded: Path, tmp_path: Path) 
     assert kept == near
     assert len(near) < len(whole)
     status = recorder.status()
-    assert (status["recording"], status["recorded_messages"]) == (RecordingState.ON, len(near))
+    assert (status["recording"], status["recorded_messages"]) == (Recording.ON, len(near))
     assert status["recording_dropped"] == 0
     for path in files:
         report = replay(Session(path))
