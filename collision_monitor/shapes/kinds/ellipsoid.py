@@ -81,7 +81,12 @@ def ellipsoid_distance(e: Vector, x: Vector) -> tuple[float, float, Vector]:
                 lower = out
                 n = (side if k == 0 else 0.0, side if k == 1 else 0.0, side if k == 2 else 0.0)
         return lower, (f - 1.0) * least, n
-    return lower, sqrt(dot(x, x)) * (1.0 - 1.0 / f), n
+    away = sqrt(dot(x, x))
+    u = x[0] / away, x[1] / away, x[2] / away
+    radial = away - ellipsoid_support(e, u[0], u[1], u[2])  # the better bound far away
+    if radial > lower:
+        lower, n = radial, u
+    return lower, away * (1.0 - 1.0 / f), n
 
 
 def _contains(shape: Ellipsoid, p: Array) -> Booleans:

@@ -84,7 +84,7 @@ def test_points_are_not_located_in_a_soup_beyond_a_number_of_tests(monkeypatch: 
     )
     mesh = soup(400)
     side = Posed([(mesh, Pose())], Pose(), [(mesh, Pose())])
-    assert deepest.locate(side, side, np.zeros(3)) == UNKNOWN
+    assert deepest.locate_in_meshes(side, side, np.zeros(3)) == UNKNOWN
     assert sum(map(len, located)) * len(mesh.faces) <= 4_000
 
 
