@@ -162,6 +162,8 @@ class ShapeType(IntEnum):
     POLYGON = 10
     ELLIPSOID = 11
     POINTS = 12
+    ROUNDED_BOX = 13
+    TRUNCATED_CONE = 14
 
 
 Rows = NDArray[np.void]

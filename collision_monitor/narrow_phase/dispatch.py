@@ -34,24 +34,23 @@ from collision_monitor.narrow_phase.half_space import half_space_contact, half_s
 from collision_monitor.narrow_phase.pair_pose import PairPose, pair_pose, swapped
 from collision_monitor.narrow_phase.polygon_polygon import planar_contact
 from collision_monitor.narrow_phase.sphere_box import sphere_box_contact, sphere_box_separation
-from collision_monitor.narrow_phase.sphere_cone import sphere_cone_contact
+from collision_monitor.narrow_phase.sphere_solid import sphere_solid_contact
 from collision_monitor.narrow_phase.sphere_sphere import sphere_sphere_contact, sphere_sphere_separation
 from collision_monitor.narrow_phase.work_memory import WORK_SIZE
 from collision_monitor.shapes.kinds.box import BOX
 from collision_monitor.shapes.kinds.capsule import CAPSULE
 from collision_monitor.shapes.kinds.circle import CIRCLE
-from collision_monitor.shapes.kinds.cone import CONE
 from collision_monitor.shapes.kinds.cylinder import CYLINDER
 from collision_monitor.shapes.kinds.half_space import HALF_SPACE
 from collision_monitor.shapes.kinds.polygon import POLYGON
 from collision_monitor.shapes.kinds.sphere import SPHERE
-from collision_monitor.shapes.registry import CURVED
+from collision_monitor.shapes.registry import CURVED, KINDS
 
 TEST_METHODS: Final = {
     "sphere_sphere": "centres",
     "sphere_box": "clamping",
     "capsule_capsule": "closest points of segments",
-    "sphere_cone": "closed form",
+    "sphere_solid": "distance of the centre",
     "cylinder_cylinder": "closed form where the axes are parallel, else GJK and EPA",
     "box_box": "SAT",
     "half_space": "support distance",
@@ -64,7 +63,7 @@ TEST_METHODS: Final = {
     SPHERE_SPHERE,
     SPHERE_BOX,
     CAPSULE_CAPSULE,
-    SPHERE_CONE,
+    SPHERE_SOLID,
     CYLINDER_CYLINDER,
     BOX_BOX,
     HALF_SPACE_ANY,
@@ -77,7 +76,6 @@ PAIR_TESTS: Final = {
     (SPHERE, BOX): SPHERE_BOX,
     (SPHERE, CAPSULE): CAPSULE_CAPSULE,
     (SPHERE, CYLINDER): CYLINDER_CYLINDER,
-    (SPHERE, CONE): SPHERE_CONE,
     (BOX, BOX): BOX_BOX,
     (CAPSULE, CAPSULE): CAPSULE_CAPSULE,
     (CAPSULE, CYLINDER): CYLINDER_CYLINDER,
@@ -86,13 +84,14 @@ PAIR_TESTS: Final = {
     (CIRCLE, POLYGON): POLYGON_POLYGON,
     (POLYGON, POLYGON): POLYGON_POLYGON,
 }
-"""Pairs of kinds with a test of their own, the smaller kind first. Any solid and a half-space have HALF_SPACE_ANY, all
-other solids CONVEX_CONVEX. Plane shapes and solids are never paired."""
+"""Pairs of kinds with a test of their own, the smaller kind first. Any solid and a half-space have HALF_SPACE_ANY, a
+sphere and a solid with an exact distance SPHERE_SOLID, all others CONVEX_CONVEX. Plane shapes never meet solids."""
 
 _TEST_OF: Final = np.full((len(CURVED), len(CURVED)), CONVEX_CONVEX, np.uint8)
 """The test for the kernels: a row for each kind of A, a column for each kind of B."""
 
 _TEST_OF[:, HALF_SPACE] = HALF_SPACE_ANY
+_TEST_OF[SPHERE, [kind.number for kind in KINDS if kind.exact]] = SPHERE_SOLID
 for _kinds, _test in PAIR_TESTS.items():
     _TEST_OF[_kinds] = _test
 
@@ -230,11 +229,8 @@ def _closed_form(test: int, table: Any, a: int, b: int, pose: PairPose, out: Any
     if test == CYLINDER_CYLINDER and is_parallel(table, a, pose):
         parallel_cylinders_contact(table, a, b, pose.R_B, pose.p, out)
         return True
-    if test == SPHERE_CONE:
-        sphere_cone_contact(
-            table.size[a, 0] + table.margin[a], table.size[b, 0], table.size[b, 1], table.margin[b],
-            pose.R_B, pose.p, out,
-        )  # fmt: skip
+    if test == SPHERE_SOLID:
+        sphere_solid_contact(table, a, b, pose, out)
         return True
     return False
 

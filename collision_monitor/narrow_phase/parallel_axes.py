@@ -15,7 +15,6 @@ from collision_monitor.geometry.vector import Vector
 from collision_monitor.narrow_phase.core import Core
 from collision_monitor.narrow_phase.work_memory import P_AB, R_AB
 from collision_monitor.shapes.calls import revolved_profile
-from collision_monitor.shapes.kinds.sphere import SPHERE
 from collision_monitor.shapes.registry import REVOLVED
 from collision_monitor.tolerances import FEATURE_TIE, SEGMENT_PARALLEL_SIN2
 
@@ -26,7 +25,7 @@ def axes_are_parallel(A: Core, B: Core, work: Any) -> bool:
     if not REVOLVED[B.kind] or not REVOLVED[A.kind]:
         return False
     x, y = work[R_AB + 2], work[R_AB + 5]
-    return A.kind == SPHERE or B.kind == SPHERE or x * x + y * y <= SEGMENT_PARALLEL_SIN2
+    return x * x + y * y <= SEGMENT_PARALLEL_SIN2
 
 
 @device

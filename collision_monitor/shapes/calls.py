@@ -38,7 +38,13 @@ from collision_monitor.shapes.kinds.ellipsoid import (
 from collision_monitor.shapes.kinds.half_space import HALF_SPACE
 from collision_monitor.shapes.kinds.polygon import POLYGON
 from collision_monitor.shapes.kinds.sphere import SPHERE, distance_from_centre
-from collision_monitor.shapes.revolved import revolved_distance, revolved_feature
+from collision_monitor.shapes.kinds.truncated_cone import TRUNCATED_CONE
+from collision_monitor.shapes.revolved import (
+    revolved_distance,
+    revolved_feature,
+    revolved_support,
+    revolved_support_point,
+)
 from collision_monitor.tolerances import LARGEST_INPUT
 
 BEYOND: Final = 2.0 * LARGEST_INPUT
@@ -62,6 +68,8 @@ def support_point(kind: int, size: Vector, vertices: Any, first: int, count: int
         return ellipsoid_support_point(size, d)
     if kind == CIRCLE:
         return circle_support_point(size[0], d)
+    if kind == TRUNCATED_CONE:
+        return revolved_support_point(size[2], size[0], size[1], d)
     if kind == CONVEX_HULL or kind == POLYGON:
         best = farthest_vertex(vertices, first, count, d[0], d[1], d[2])
         return vertices[0, best], vertices[1, best], vertices[2, best]
@@ -88,6 +96,8 @@ def core_support(table: Any, slot: int, x: float, y: float, z: float) -> float:
         return ellipsoid_support((s0, s1, table.size[slot, 2]), x, y, z)
     if kind == CIRCLE:
         return circle_support(s0, x, y)
+    if kind == TRUNCATED_CONE:
+        return revolved_support(table.size[slot, 2], s0, s1, x, y, z)
     if kind == CONVEX_HULL or kind == POLYGON:
         best = -inf
         first = table.vertex_start[slot]
@@ -127,6 +137,8 @@ def revolved_profile(kind: int, size: Vector) -> tuple[float, float, float]:
         return size[0], size[0], size[1]
     if kind == CONE:
         return 0.0, size[0], size[1]
+    if kind == TRUNCATED_CONE:
+        return size[2], size[0], size[1]
     return 0.0, 0.0, size[1] if kind == CAPSULE else 0.0
 
 
@@ -150,6 +162,8 @@ def point_distance_range(table: Any, s: int, x: Vector) -> tuple[float, float, V
         distance, n = cylinder_distance(s0, s1, x)
     elif kind == CONE:
         distance, n = revolved_distance(0.0, s0, s1, x)
+    elif kind == TRUNCATED_CONE:
+        distance, n = revolved_distance(s2, s0, s1, x)
     elif kind == HALF_SPACE:
         n = s0, s1, s2
         distance = dot(n, x) - table.size[s, 3]
@@ -172,7 +186,7 @@ def point_feature(table: Any, s: int, x: Vector, n: Vector, reach: float) -> tup
     size = table.size[s, 0], table.size[s, 1], table.size[s, 2]
     if kind == BOX:
         return box_feature(size, x, n, reach)
-    if kind == CYLINDER or kind == CONE:
+    if kind == CYLINDER or kind == CONE or kind == TRUNCATED_CONE:
         top, bottom, half = revolved_profile(kind, size)
         return revolved_feature(top, bottom, half, x, n, reach)
     if kind == HALF_SPACE:

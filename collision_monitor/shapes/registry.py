@@ -21,7 +21,9 @@ from collision_monitor.shapes.kinds import (
     mesh,
     points,
     polygon,
+    rounded_box,
     sphere,
+    truncated_cone,
 )
 from collision_monitor.shapes.kinds.box import Box as Box
 from collision_monitor.shapes.kinds.capsule import Capsule as Capsule
@@ -35,12 +37,14 @@ from collision_monitor.shapes.kinds.half_space import HalfSpace as HalfSpace
 from collision_monitor.shapes.kinds.mesh import Mesh as Mesh
 from collision_monitor.shapes.kinds.points import Points as Points
 from collision_monitor.shapes.kinds.polygon import Polygon as Polygon
+from collision_monitor.shapes.kinds.rounded_box import RoundedBox as RoundedBox
 from collision_monitor.shapes.kinds.sphere import Sphere as Sphere
+from collision_monitor.shapes.kinds.truncated_cone import TruncatedCone as TruncatedCone
 from collision_monitor.shapes.shape import Shape as Shape
 
 __all__ = [
     "Box", "Capsule", "Circle", "Cone", "ConvexHull", "Cylinder", "Ellipsoid", "HalfSpace", "Mesh", "Points", "Polygon",
-    "Sphere",
+    "RoundedBox", "Sphere", "TruncatedCone",
 ]  # fmt: skip
 """The public classes, for type checkers of `collision_monitor`."""
 
@@ -48,6 +52,7 @@ KINDS: Final[tuple[Kind, ...]] = tuple(
     each.KIND
     for each in (
         sphere, box, capsule, cylinder, cone, convex_hull, mesh, half_space, circle, polygon, ellipsoid, points,
+        rounded_box, truncated_cone,
     )
 )  # fmt: skip
 """Every kind that a message may hold, in the order of its numbers."""

@@ -75,9 +75,7 @@ def revolved_distance(top: float, bottom: float, half: float, x: Vector) -> tupl
 
 
 @device
-def revolved_feature(
-    top: float, bottom: float, half: float, x: Vector, n: Vector, reach: float
-) -> tuple[float, float]:
+def revolved_feature(top: float, bottom: float, half: float, x: Vector, n: Vector, reach: float) -> tuple[float, float]:
     """Type and index of the feature at a point x of the surface, for an outward normal n.
 
     Face and rim 0 are at +z and 1 at -z; a cone has its apex as vertex 0, and its only face and rim have the number 0.

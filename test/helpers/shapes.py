@@ -24,6 +24,8 @@ EXAMPLES: Final[dict[ShapeType, Shape]] = {
     ShapeType.POLYGON: cm.Polygon([(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)]),
     ShapeType.ELLIPSOID: cm.Ellipsoid((0.7, 0.5, 0.25)),
     ShapeType.POINTS: cm.Points(np.random.default_rng(2).uniform(-0.5, 0.5, (20, 3)), 0.05),
+    ShapeType.ROUNDED_BOX: cm.RoundedBox((1.0, 0.8, 0.6), 0.15),
+    ShapeType.TRUNCATED_CONE: cm.TruncatedCone(0.5, 0.2, 1.0),
 }
 
 CONVEX_SOLIDS: Final = {

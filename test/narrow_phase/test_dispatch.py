@@ -58,7 +58,8 @@ def test_the_table_has_closed_forms_of_pairs_that_can_meet() -> None:
 @pytest.mark.parametrize("ask", ["contact_within", "separation"])
 @pytest.mark.parametrize("kinds", SLOT_PAIRS, ids=lambda kinds: "-".join(KIND_NAMES[kind] for kind in kinds))
 def test_the_test_in_the_table_answers(monkeypatch: pytest.MonkeyPatch, kinds: tuple[int, int], ask: str) -> None:
-    file = pair_test(*kinds)
+    slots = [kind_of(EXAMPLES[ShapeType(kind)]).row(EXAMPLES[ShapeType(kind)], None) for kind in kinds]
+    file = pair_test(*(slot.number for slot in slots if slot is not None))
     for pair in {kinds, kinds[::-1]}:
         with monkeypatch.context() as patch:
             assert answering(patch, pair, ask, True) == [file]

@@ -169,5 +169,6 @@ KIND: Final = Kind(
     scaled=lambda shape, factor: Box([factor * s for s in shape.size]),
     corners=lambda shape: shape.corners,
     farthest=lambda shape: np.array(shape.size),
+    exact=True,
     packed=True,
 )

@@ -97,5 +97,6 @@ KIND: Final = Kind(
     farthest=lambda shape: np.array([0.0, 0.0, 1.0]),
     round=True,
     revolved=True,
+    exact=True,
     packed=True,
 )

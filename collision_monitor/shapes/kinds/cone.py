@@ -86,5 +86,6 @@ KIND: Final = Kind(
     curved=True,
     round=True,
     revolved=True,
+    exact=True,
     packed=True,
 )
