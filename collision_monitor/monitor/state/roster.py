@@ -187,6 +187,11 @@ class Roster(Stage):
         is_stale = bodies.seen[used] & ~bodies.static[used] & (now - bodies.time[used] > stale_after)
         return sorted(bodies.id[used[is_stale]].tolist())
 
+    def unseen_ids(self) -> list[int]:
+        """Ids of the moving objects without any state, ascending."""
+        bodies, used = self.bodies, self.used()
+        return sorted(bodies.id[used[~bodies.seen[used] & ~bodies.static[used]]].tolist())
+
     # ------------------------------------------------------------------ changing
 
     def describe(self, d: ObjectDescription, model: Model, prepared: Modelled | None = None) -> int:
