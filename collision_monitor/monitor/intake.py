@@ -100,9 +100,7 @@ class Intake(Stage):
         now_ns = None if given.now_ns is None else checked_nanoseconds(given.now_ns, "now_ns")
         return Observed(stamp_ns, now_ns, *self._states(*given[1:5]))
 
-    def _states(
-        self, ids: ArrayLike, poses: Any, twists: Any, covariance: Any
-    ) -> tuple[States, NDArray[np.float64]]:
+    def _states(self, ids: ArrayLike, poses: Any, twists: Any, covariance: Any) -> tuple[States, NDArray[np.float64]]:
         """Return the states (N,) records.STATE and the covariances (N, 12), or (0, 12). Raises InputError.
 
         With covariances, the states get the standard deviations along their worst axes.

@@ -47,9 +47,7 @@ class Monitor(Stages):
 
     def __init__(self, profile: str | Profile = "balanced", *, timed: bool = True, warns: bool = True) -> None:
         """Make a monitor without objects. warns: whether the first refusal of each kind is a RefusalWarning too."""
-        super().__init__(
-            profile if isinstance(profile, Profile) else Profile.named(profile), timed=timed, warns=warns
-        )
+        super().__init__(profile if isinstance(profile, Profile) else Profile.named(profile), timed=timed, warns=warns)
         self._prepare_for_budget()
 
     def __repr__(self) -> str:

@@ -89,9 +89,10 @@ def test_the_same_states_give_the_same_answers_from_a_snapshot():
     it.step(0, IDS, poses(TOGETHER))
     again = Monitor.restored("exact", it.snapshot())
     for step, at in enumerate((TOGETHER, APART, TOGETHER, APART), start=1):
-        assert it.step(step * 10**7, IDS, poses(at)).contacts.tobytes() == again.step(
-            step * 10**7, IDS, poses(at)
-        ).contacts.tobytes()
+        assert (
+            it.step(step * 10**7, IDS, poses(at)).contacts.tobytes()
+            == again.step(step * 10**7, IDS, poses(at)).contacts.tobytes()
+        )
     assert it.digest == again.digest
 
 

@@ -16,7 +16,7 @@ from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.pipeline import state_intake
 from collision_monitor.pipeline.pipeline import Outputs, Pipeline
 from collision_monitor.pipeline.state_intake import ReceivedStates
-from collision_monitor.shapes.shapes import Sphere
+from collision_monitor.shapes.registry import Sphere
 
 PACKAGE = Path(codec.__file__).parents[1]
 
@@ -71,9 +71,7 @@ def _is_monitor_of_a_pipeline(node: ast.AST) -> bool:
     return "pipeline" in (getattr(owner, "attr", "") or getattr(owner, "id", "")).lower()
 
 
-def test_a_message_that_was_decoded_is_not_decoded_again(
-    pipeline: Pipeline, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_message_that_was_decoded_is_not_decoded_again(pipeline: Pipeline, monkeypatch: pytest.MonkeyPatch) -> None:
     received = ReceivedStates.decode(message())
     monkeypatch.setattr(state_intake, "decode_states", None)  # a call would raise TypeError
     outputs = pipeline.take_states(received)
