@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor import records
-from collision_monitor._jit import device, kernel
+from collision_monitor._jit import device, inlined, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor.errors import InputError, Refusal
 from collision_monitor.monitor.refusals import Refusals, some_ids
@@ -287,62 +287,74 @@ def take_states(bodies, slots, numbers, flags, time, rates, verdicts):
     uncertain = False
     for k in range(slots.size):
         i = slots[k]
-        if i < 0:
-            verdicts[k] = UNKNOWN_ID
+        verdicts[k] = _verdict(bodies, i, numbers, k, flags[k], time, rates)
+        if verdicts[k] != ACCEPTED:
             continue
-        known_twist = (flags[k] & _TWIST_UNKNOWN) == 0
-        usable = True
-        for c in range(13 if known_twist else 7):
-            usable &= abs(numbers[k, c]) <= LARGEST_INPUT
-        accelerates = (flags[k] & _ACCELERATION_VALID) != 0
-        for c in range(13, 16 if accelerates else 13):
-            usable &= abs(numbers[k, c]) <= LARGEST_INPUT
-        for c in range(16, STATE_NUMBERS):  # standard deviations; NaN: unknown
-            usable &= not (numbers[k, c] < 0.0 or numbers[k, c] > LARGEST_INPUT)
-        if not usable:
-            verdicts[k] = NON_FINITE
-            continue
-        x, y, z, w = numbers[k, 3], numbers[k, 4], numbers[k, 5], numbers[k, 6]
-        norm = sqrt(x * x + y * y + z * z + w * w)
-        if not abs(norm - 1.0) <= UNIT_QUATERNION:
-            verdicts[k] = QUATERNION
-            continue
-        if bodies.static[i] or (bodies.seen[i] and time <= bodies.time[i]):
-            verdicts[k] = OLD
-            continue
-        is_soon = bodies.seen[i] and (time - bodies.time[i]) * rates[i] < EARLY and rates[i] < inf
-        if is_soon and (flags[k] & _DISCONTINUITY) == 0:
-            verdicts[k] = LEFT_OUT
-            continue
-        x, y, z, w = x / norm, y / norm, z / norm, w / norm
-        if known_twist:
-            for c in range(3):
-                bodies.linear[i, c] = numbers[k, 7 + c]
-                bodies.angular[i, c] = numbers[k, 10 + c]
-        elif bodies.seen[i] and (flags[k] & _DISCONTINUITY) == 0:
-            _estimate_twist(bodies, i, numbers[k, :3], (x, y, z, w), time - bodies.time[i])
-            for c in range(3 if accelerates else 0):
-                # the estimate is the mean velocity since the last state, which the body had half-way
-                bodies.linear[i, c] += 0.5 * numbers[k, 13 + c] * (time - bodies.time[i])
-            for c in (_POSITION_STDDEV, _ORIENTATION_STDDEV):
-                if numbers[k, c] > 0.0 and not numbers[k, c + 2] > 0.0:
-                    # of the difference of two poses; assumes that the last one was as uncertain as this one
-                    numbers[k, c + 2] = sqrt(2.0) * numbers[k, c] / (time - bodies.time[i])
-        else:
-            bodies.linear[i] = 0.0
-            bodies.angular[i] = 0.0
-        for c in range(3):
-            bodies.acceleration[i, c] = numbers[k, 13 + c] if accelerates else 0.0
-            bodies.position[i, c] = numbers[k, c]
-        bodies.quaternion[i, 0], bodies.quaternion[i, 1] = x, y
-        bodies.quaternion[i, 2], bodies.quaternion[i, 3] = z, w
-        bodies.time[i] = time
-        bodies.seen[i] = True
-        verdicts[k] = ACCEPTED
+        _store(bodies, i, numbers, k, flags[k], time)
         accepted += 1
         for c in range(16, STATE_NUMBERS):
             uncertain |= numbers[k, c] > 0.0
     return accepted, uncertain
+
+
+@inlined
+def _norm(numbers, k):
+    """Length of the quaternion in row k."""
+    x, y, z, w = numbers[k, 3], numbers[k, 4], numbers[k, 5], numbers[k, 6]
+    return sqrt(x * x + y * y + z * z + w * w)
+
+
+@inlined
+def _verdict(bodies, i, numbers, k, flags, time, rates):
+    """What becomes of the state in row k, of body i: ACCEPTED, LEFT_OUT or the reason of the refusal."""
+    if i < 0:
+        return UNKNOWN_ID
+    usable = True
+    for c in range(13 if (flags & _TWIST_UNKNOWN) == 0 else 7):
+        usable &= abs(numbers[k, c]) <= LARGEST_INPUT
+    for c in range(13, 16 if (flags & _ACCELERATION_VALID) != 0 else 13):
+        usable &= abs(numbers[k, c]) <= LARGEST_INPUT
+    for c in range(16, STATE_NUMBERS):  # standard deviations; NaN: unknown
+        usable &= not (numbers[k, c] < 0.0 or numbers[k, c] > LARGEST_INPUT)
+    if not usable:
+        return NON_FINITE
+    if not abs(_norm(numbers, k) - 1.0) <= UNIT_QUATERNION:
+        return QUATERNION
+    if bodies.static[i] or (bodies.seen[i] and time <= bodies.time[i]):
+        return OLD
+    is_soon = bodies.seen[i] and (time - bodies.time[i]) * rates[i] < EARLY and rates[i] < inf
+    return LEFT_OUT if is_soon and (flags & _DISCONTINUITY) == 0 else ACCEPTED
+
+
+@inlined
+def _store(bodies, i, numbers, k, flags, time):
+    """Make the state in row k the last one of body i."""
+    accelerates = (flags & _ACCELERATION_VALID) != 0
+    norm = _norm(numbers, k)
+    x, y, z, w = numbers[k, 3] / norm, numbers[k, 4] / norm, numbers[k, 5] / norm, numbers[k, 6] / norm
+    if (flags & _TWIST_UNKNOWN) == 0:
+        for c in range(3):
+            bodies.linear[i, c] = numbers[k, 7 + c]
+            bodies.angular[i, c] = numbers[k, 10 + c]
+    elif bodies.seen[i] and (flags & _DISCONTINUITY) == 0:
+        _estimate_twist(bodies, i, numbers[k, :3], (x, y, z, w), time - bodies.time[i])
+        for c in range(3 if accelerates else 0):
+            # the estimate is the mean velocity since the last state, which the body had half-way
+            bodies.linear[i, c] += 0.5 * numbers[k, 13 + c] * (time - bodies.time[i])
+        for c in (_POSITION_STDDEV, _ORIENTATION_STDDEV):
+            if numbers[k, c] > 0.0 and not numbers[k, c + 2] > 0.0:
+                # of the difference of two poses; assumes that the last one was as uncertain as this one
+                numbers[k, c + 2] = sqrt(2.0) * numbers[k, c] / (time - bodies.time[i])
+    else:
+        bodies.linear[i] = 0.0
+        bodies.angular[i] = 0.0
+    for c in range(3):
+        bodies.acceleration[i, c] = numbers[k, 13 + c] if accelerates else 0.0
+        bodies.position[i, c] = numbers[k, c]
+    bodies.quaternion[i, 0], bodies.quaternion[i, 1] = x, y
+    bodies.quaternion[i, 2], bodies.quaternion[i, 3] = z, w
+    bodies.time[i] = time
+    bodies.seen[i] = True
 
 
 @device
