@@ -12,7 +12,8 @@ from collections.abc import Callable
 import numpy as np
 
 from collision_monitor._jit import kernel
-from collision_monitor.broad_phase.dense_grid import CLASSES, STARTING, Bounds, partners, places, searches, sort_by_cell
+from collision_monitor.broad_phase.dense_grid import Bounds, partners, places, searches, sort_by_cell
+from collision_monitor.broad_phase.size_classes import CLASSES, STARTING
 from collision_monitor.detection.detector import Detector, kernels
 from collision_monitor.world.moving_bodies import make_moving_bodies
 

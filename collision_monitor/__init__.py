@@ -46,7 +46,7 @@ _HOME = {
     "load_mesh": "shapes.mesh_file",
     "contact": "query.contact.contact",
     "Contact": "query.contact.contact",
-    "contact_features": "query.contact.features",
+    "contact_features": "query.contact.features_in_contact",
     "overlap": "query.contact.overlap",
     "distance": "query.contact.distance",
     "contacts": "query.contact.contacts",
@@ -61,7 +61,7 @@ _HOME = {
     "convex_decomposition": "objects.convex_decomposition",
     "Decomposition": "objects.convex_decomposition",
     "time_of_impact": "query.impact.time_of_impact",
-    "Impact": "query.impact.time_of_impact",
+    "Impact": "query.impact.impact",
     "time_of_impact_batch": "query.impact.time_of_impact_batch",
     "Impacts": "query.impact.time_of_impact_batch",
     "vertex_face_impact": "query.impact.feature_impact",
@@ -111,12 +111,12 @@ if TYPE_CHECKING:
     from collision_monitor.query.contact.contacts import Contacts as Contacts
     from collision_monitor.query.contact.contacts import contacts as contacts
     from collision_monitor.query.contact.distance import distance as distance
-    from collision_monitor.query.contact.features import contact_features as contact_features
+    from collision_monitor.query.contact.features_in_contact import contact_features as contact_features
     from collision_monitor.query.contact.overlap import overlap as overlap
     from collision_monitor.query.impact.feature_impact import FeatureImpact as FeatureImpact
     from collision_monitor.query.impact.feature_impact import edge_edge_impact as edge_edge_impact
     from collision_monitor.query.impact.feature_impact import vertex_face_impact as vertex_face_impact
-    from collision_monitor.query.impact.time_of_impact import Impact as Impact
+    from collision_monitor.query.impact.impact import Impact as Impact
     from collision_monitor.query.impact.time_of_impact import time_of_impact as time_of_impact
     from collision_monitor.query.impact.time_of_impact_batch import Impacts as Impacts
     from collision_monitor.query.impact.time_of_impact_batch import time_of_impact_batch as time_of_impact_batch

@@ -6,9 +6,13 @@ import os
 import socket
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import HealthCheck, settings
+
+if TYPE_CHECKING:
+    from started_threads import StartedThreads
 
 # The same examples on every run and every machine; HYPOTHESIS_PROFILE=explore searches for new ones.
 settings.register_profile(
@@ -45,6 +49,15 @@ def ros_domain_id(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
             yield domain
         return
     raise RuntimeError("every ROS domain from 1 to 100 is claimed by another test")
+
+
+@pytest.fixture
+def started_threads() -> Iterator[StartedThreads]:
+    """Threads start in the smallest scene, and the number of those that worked at once is counted."""
+    from started_threads import threads_start  # imports the kernels too
+
+    with threads_start() as started:
+        yield started
 
 
 @pytest.fixture(scope="session")

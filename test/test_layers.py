@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from graphlib import CycleError, TopologicalSorter
+from itertools import pairwise
 from pathlib import Path
 from typing import Final
 
@@ -101,6 +103,31 @@ def test_imports_point_down(module: str) -> None:
         assert below is not None, f"{module} imports {other}, which is on no floor"
         is_inside = top(other) == own or (module.removeprefix(f"{NAME}."), top(other)) in SIDEWAYS
         assert below < height or is_inside, f"{module} imports {other}, which is not below it"
+
+
+def circle(imports: dict[str, set[str]]) -> list[str]:
+    """Return modules each of which imports the next one, and the first one again at the end; empty: there are none."""
+    try:
+        TopologicalSorter(imports).prepare()
+    except CycleError as error:
+        return list(reversed(error.args[1]))  # the sorter lists each module behind one that imports it
+    return []
+
+
+def test_no_modules_import_each_other_in_a_circle() -> None:
+    found = circle({module: imported(path) & FILES.keys() - {module} for module, path in FILES.items()})
+    assert not found, f"a circle of imports, also counting those inside functions: {' -> '.join(found)}"
+
+
+def test_a_circle_is_found_and_named_in_its_direction(tmp_path: Path) -> None:
+    names = ("a", "b", "c", "d")
+    inside = "def late():\n    from collision_monitor.shapes import pose\n"
+    (tmp_path / "late.py").write_text(inside)
+    assert imported(tmp_path / "late.py") == {f"{NAME}.shapes.pose"}, "imports inside functions count"
+    found = circle(dict(zip(names, ({"b"}, {"c"}, {"d"}, {"b"}), strict=True)))
+    assert found[0] == found[-1] and set(found) == {"b", "c", "d"}
+    assert all(pair in {("b", "c"), ("c", "d"), ("d", "b")} for pair in pairwise(found))
+    assert circle(dict(zip(names, ({"b"}, {"c"}, {"d"}, set()), strict=True))) == []
 
 
 @pytest.mark.parametrize(("module", "other"), SIDEWAYS)

@@ -16,7 +16,7 @@ from collision_monitor.alerts.rules import Rule, Rules
 from collision_monitor.alerts.selection import Classes, select
 from collision_monitor.alerts.thresholds import APPROACH
 from collision_monitor.alerts.traffic import post_encroachment_time, required_deceleration, time_headway
-from collision_monitor.broad_phase.dense_grid import box_pairs
+from collision_monitor.broad_phase.box_pairs import box_pairs
 from collision_monitor.impact.impact_record import ids_of_keys, pair_keys
 from collision_monitor.monitor.candidates import filters_of, keep_checked
 

@@ -1,36 +1,26 @@
 """Broad phase for bodies that all move: counts the bodies into cells, sorts them by cell, compares row by row.
 
-Bodies of similar size share a class, and each class has its own cells, as wide as its largest body. A body searches for
-partners in its own class and the coarser ones, so that each pair is found once, by its smaller body. The cells of a
-class form a dense array if their number is a small multiple of the number of bodies, else a hash table, so that empty
-space costs nothing. In both, the cells of a row along x are adjacent, so the three cells that a body reaches in a row
-hold one contiguous range of bodies.
+Each size class (`size_classes`) has its own cells, as wide as its largest body. The cells of a class form a dense array
+if their number is a small multiple of the number of bodies, else a hash table, so that empty space costs nothing. In
+both, the cells of a row along x are adjacent, so the three cells that a body reaches in a row hold one contiguous range
+of bodies.
 Source: lecture slides "Efficient collision detection: spatial partitioning" (uniform, hashed and multiresolution
 grids); counting sort by cell: Green, "Particle simulation using CUDA", 2010.
 """
 
 from __future__ import annotations
 
-from math import frexp
 from typing import Any, Final, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor._jit import allocating_kernel, device, inlined
 from collision_monitor._jit.prefetch import prefetch
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.broad_phase.lanes import boxes_overlap, lowest_bit, spheres_overlap_lanes
 from collision_monitor.broad_phase.region import Region
-from collision_monitor.errors import InputError
+from collision_monitor.broad_phase.size_classes import ABSENT, OCTAVES, STARTING, classify
 from collision_monitor.tolerances import EPSILON
-
-MAX_CLASSES: Final = 32
-"""Number of size classes; the last class also takes all smaller bodies."""
-
-CROWDING: Final = 8.0
-"""Sizes share a class while cells fitted to the largest hold at most this many times the candidates of cells fitted
-to each body. Larger: small bodies among large ones are compared with too many. Smaller: more classes."""
 
 DENSE: Final = 4
 """Cells per body up to which a class has a dense array, since filling it must not cost more than the search."""
@@ -44,24 +34,13 @@ STRIP: Final = 2
 FARTHEST_CELL: Final = 2.0**52
 """Hashed cell coordinates are clipped here, where float64 still represents every integer; bodies beyond share cells."""
 
-LARGEST_BODY: Final = 2.0**200
-"""Bodies with a larger half extent or coordinate (m) are compared with all, so that products of cells stay finite."""
-
 AHEAD: Final = 8
 """Iterations between prefetch and use: 100,000 bodies fit into no cache and are not in the order of the cells."""
 
 PAD: Final = LANES
 """Elements behind the last sorted body that a vector load may read."""
 
-STARTING: Final = MAX_CLASSES + 1
-"""Number of classes of bodies that start a search: class 0 for unbounded bodies, then from large to small."""
-
-CLASSES: Final = 2 * STARTING
-"""Number of all classes: those of bodies that start a search, then those of bodies that do not, in the same order."""
-
-_OCTAVES: Final = 512
 _HASHED, _DENSE, _WHOLE = 0, 1, 2
-_ABSENT: Final = CLASSES
 _FIRST, _COUNT, _BASE, _MODE, _NX, _NY, _NZ, _STRIP = range(8)
 _INVERSE, _REACH, _LARGEST = range(3)
 
@@ -73,8 +52,8 @@ class Grid(NamedTuple):
     bucket: Any  # (N,) int32: the body's cell, numbered over all classes
     start: Any  # (T + 2,) int32: first place of each cell in `order`
     order: Any  # (N,) int32: the bodies sorted by cell
-    layout: Any  # (_ABSENT + 1, 8) int64, per class: first place, count, first cell, mode, cells along x, y, z, strip
-    scale: Any  # (_ABSENT + 1, 3) float64: 1 / cell width (1/m), largest half extent (m) with round-off, and without
+    layout: Any  # (ABSENT + 1, 8) int64, per class: first place, count, first cell, mode, cells along x, y, z, strip
+    scale: Any  # (ABSENT + 1, 3) float64: 1 / cell width (1/m), largest half extent (m) with round-off, and without
     origin: Any  # (3,) float64: lower corner of the dense cells (m)
     centre: Any  # (3, N + PAD) float64, sorted by cell
 
@@ -88,59 +67,17 @@ class Bounds(NamedTuple):
 
 def make_grid(capacity: int) -> Grid:
     """Allocate scratch memory for up to `capacity` bodies."""
-    cells = DENSE * capacity + (_ABSENT + 1) * FEWEST_CELLS
+    cells = DENSE * capacity + (ABSENT + 1) * FEWEST_CELLS
     return Grid(
         klass=np.zeros(capacity, np.uint8),
         bucket=np.zeros(capacity, np.int32),
         start=np.zeros(cells + 2, np.int32),
         order=np.zeros(capacity, np.int32),
-        layout=np.zeros((_ABSENT + 1, 8), np.int64),
-        scale=np.zeros((_ABSENT + 1, 3)),
+        layout=np.zeros((ABSENT + 1, 8), np.int64),
+        scale=np.zeros((ABSENT + 1, 3)),
         origin=np.zeros(3),
         centre=np.zeros((3, capacity + PAD)),
     )
-
-
-@device
-def classify(size: Any, starts: Any, octave: Any, cubes: Any, grid: Any) -> None:
-    """Assign bodies with half extent `size` (N,) m to classes; NaN: absent, beyond LARGEST_BODY: unbounded.
-
-    octave (_OCTAVES, 2): scratch for counts and classes; cubes (_OCTAVES, 2): scratch for the sum and the maximum of
-    the cubed sizes in an octave, relative to the octave's size. Overwrites grid.bucket.
-    """
-    octave[:] = 0
-    cubes[:] = 0.0
-    for i in range(size.size):
-        if size[i] <= LARGEST_BODY:
-            mantissa, exponent = frexp(size[i])
-            k = min(max(exponent + _OCTAVES // 2, 0), _OCTAVES - 1)
-            grid.bucket[i] = k
-            octave[k, 0] += 1
-            cubes[k, 0] += mantissa * mantissa * mantissa
-            cubes[k, 1] = max(cubes[k, 1], mantissa * mantissa * mantissa)
-    number = 0
-    count, cube = 0, 0.0
-    top = -1
-    for k in range(_OCTAVES - 1, -1, -1):
-        if octave[k, 0] == 0:
-            continue
-        shrink = 0.5 ** (3 * min(max(top - k, 0), 100))
-        fitted = cube + shrink * cubes[k, 0]
-        if top < 0 or (number < MAX_CLASSES and (count + octave[k, 0]) * cubes[top, 1] > CROWDING * fitted):
-            number += 1
-            top, count, cube = k, 0, 0.0
-            shrink = 1.0
-        count += octave[k, 0]
-        cube += shrink * cubes[k, 0]
-        octave[k, 1] = number
-    for i in range(size.size):
-        rest = 0 if starts[i] else STARTING
-        if size[i] <= LARGEST_BODY:
-            grid.klass[i] = rest + octave[grid.bucket[i], 1]
-        elif size[i] > LARGEST_BODY:
-            grid.klass[i] = rest
-        else:
-            grid.klass[i] = _ABSENT
 
 
 @inlined
@@ -189,7 +126,7 @@ def plan_cells(lx: float, ly: float, lz: float, hx: float, hy: float, hz: float,
     # round-off of a difference of two coordinates and of the product with 1 / cell width
     slack = 32.0 * EPSILON * max(abs(lx), abs(ly), abs(lz), abs(hx), abs(hy), abs(hz))
     first = cells = np.int64(0)
-    for k in range(_ABSENT + 1):
+    for k in range(ABSENT + 1):
         count = layout[k, _COUNT]
         layout[k, _FIRST] = first
         layout[k, _BASE] = cells
@@ -197,7 +134,7 @@ def plan_cells(lx: float, ly: float, lz: float, hx: float, hy: float, hz: float,
         first += count
         if count == 0:
             continue
-        if k == 0 or k == STARTING or k == _ABSENT:
+        if k == 0 or k == STARTING or k == ABSENT:
             scale[k, _REACH] = np.inf
             cells += 1
             continue
@@ -283,6 +220,12 @@ def searches(grid: Any, a: int, b: int) -> bool:
 
 
 @inlined
+def class_is_empty(grid: Any, a: int) -> bool:
+    """Return whether class a has no bodies."""
+    return grid.layout[a, _COUNT] == 0
+
+
+@inlined
 def places(grid: Any, a: int) -> Any:
     """First place of class a and the place behind its last."""
     return grid.layout[a, _FIRST], grid.layout[a, _FIRST] + grid.layout[a, _COUNT]
@@ -324,48 +267,44 @@ def _clamped(x: float, origin: float, inverse: float, last: int) -> Any:
 
 
 @inlined
-def partners(grid: Any, bounds: Any, a: int, b: int, p: int, found: Any, n: int) -> int:
-    """Append to found[n:] the places of class b that overlap place p of class a; if a == b, each pair only once.
-
-    `found` must have room for all bodies of the class and one more.
-    """
-    first, count = grid.layout[b, _FIRST], grid.layout[b, _COUNT]
-    mode = grid.layout[b, _MODE]
+def _in_dense_cells(grid: Any, bounds: Any, a: int, b: int, p: int, found: Any, n: int) -> int:
+    """`partners` in a class whose cells form an array."""
     base = grid.layout[b, _BASE]
     nx, ny, nz, strip = grid.layout[b, _NX], grid.layout[b, _NY], grid.layout[b, _NZ], grid.layout[b, _STRIP]
-    inverse, reach = grid.scale[b, _INVERSE], grid.scale[b, _REACH]
+    inverse = grid.scale[b, _INVERSE]
     cx, cy, cz = grid.centre[0, p], grid.centre[1, p], grid.centre[2, p]
-    rx = bounds.extent[0, p] * (1.0 + 16.0 * EPSILON) + reach
-    ry = rx if bounds.balls else bounds.extent[1, p] * (1.0 + 16.0 * EPSILON) + reach
-    rz = rx if bounds.balls else bounds.extent[2, p] * (1.0 + 16.0 * EPSILON) + reach
-    if mode == _DENSE:
-        ox, oy, oz = grid.origin[0], grid.origin[1], grid.origin[2]
-        x0 = _clamped(cx - rx, ox, inverse, nx - 1)
-        x1 = _clamped(cx + rx, ox, inverse, nx - 1)
-        y0 = _clamped(cy - ry, oy, inverse, ny - 1)
-        y1 = _clamped(cy + ry, oy, inverse, ny - 1)
-        z0 = _clamped(cz - rz, oz, inverse, nz - 1)
-        z1 = _clamped(cz + rz, oz, inverse, nz - 1)
-        if a == b:
-            # earlier rows search towards this one; the loop visits all rows ahead, as a data-dependent end costs more
-            z0 = _dense(cz, oz, inverse)
-            own = _dense(cy, oy, inverse)
-            y0, y1, z1 = max(own - 1, 0), min(own + 1, ny - 1), min(z0 + 1, nz - 1)
-            row = base + _row(own, z0, nz, strip) * nx
-            n = keep_overlapping(grid, bounds, p, p + 1, grid.start[row + x1 + 1], found, n)
-            if own < y1:
-                row = base + _row(y1, z0, nz, strip) * nx
-                n = keep_overlapping(grid, bounds, p, grid.start[row + x0], grid.start[row + x1 + 1], found, n)
-            z0 += 1
-        for z in range(z0, z1 + 1):
-            for y in range(y0, y1 + 1):
-                row = base + _row(y, z, nz, strip) * nx
-                n = keep_overlapping(grid, bounds, p, grid.start[row + x0], grid.start[row + x1 + 1], found, n)
-        return n
-    rows = (2.0 * ry * inverse + 2.0) * (2.0 * rz * inverse + 2.0)
-    if mode == _WHOLE or (a != b and not rows * (2.0 * rx * inverse + 2.0) < count):
-        low = p + 1 if a == b else first
-        return keep_overlapping(grid, bounds, p, low, first + count, found, n)
+    rx, ry, rz = _reaches(grid, bounds, b, p)
+    ox, oy, oz = grid.origin[0], grid.origin[1], grid.origin[2]
+    x0 = _clamped(cx - rx, ox, inverse, nx - 1)
+    x1 = _clamped(cx + rx, ox, inverse, nx - 1)
+    y0 = _clamped(cy - ry, oy, inverse, ny - 1)
+    y1 = _clamped(cy + ry, oy, inverse, ny - 1)
+    z0 = _clamped(cz - rz, oz, inverse, nz - 1)
+    z1 = _clamped(cz + rz, oz, inverse, nz - 1)
+    if a == b:
+        # earlier rows search towards this one; the loop visits all rows ahead, as a data-dependent end costs more
+        z0 = _dense(cz, oz, inverse)
+        own = _dense(cy, oy, inverse)
+        y0, y1, z1 = max(own - 1, 0), min(own + 1, ny - 1), min(z0 + 1, nz - 1)
+        row = base + _row(own, z0, nz, strip) * nx
+        n = keep_overlapping(grid, bounds, p, p + 1, grid.start[row + x1 + 1], found, n)
+        if own < y1:
+            row = base + _row(y1, z0, nz, strip) * nx
+            n = keep_overlapping(grid, bounds, p, grid.start[row + x0], grid.start[row + x1 + 1], found, n)
+        z0 += 1
+    for z in range(z0, z1 + 1):
+        for y in range(y0, y1 + 1):
+            row = base + _row(y, z, nz, strip) * nx
+            n = keep_overlapping(grid, bounds, p, grid.start[row + x0], grid.start[row + x1 + 1], found, n)
+    return n
+
+
+@inlined
+def _in_hashed_cells(grid: Any, bounds: Any, a: int, b: int, p: int, found: Any, n: int) -> int:
+    """`partners` in a class whose cells are in a hash table."""
+    base, nx, inverse = grid.layout[b, _BASE], grid.layout[b, _NX], grid.scale[b, _INVERSE]
+    cx, cy, cz = grid.centre[0, p], grid.centre[1, p], grid.centre[2, p]
+    rx, ry, rz = _reaches(grid, bounds, b, p)
     x0, x1 = _hashed(cx - rx, inverse), _hashed(cx + rx, inverse)
     y0, y1 = _hashed(cy - ry, inverse), _hashed(cy + ry, inverse)
     z0, z1 = _hashed(cz - rz, inverse), _hashed(cz + rz, inverse)
@@ -390,131 +329,36 @@ def partners(grid: Any, bounds: Any, a: int, b: int, p: int, found: Any, n: int)
     return n
 
 
-@device
-def sort_pairs(pairs: Any, count: int, other: Any, begins: Any) -> None:
-    """Sort pairs[:count] of numbers below begins.size - 1 by first, then second, with two stable counting sorts."""
-    for column in (1, 0):
-        source, target = (pairs, other) if column == 1 else (other, pairs)
-        begins[:] = 0
-        for k in range(count):
-            begins[source[k, column] + 1] += 1
-        for i in range(1, begins.size):
-            begins[i] += begins[i - 1]
-        for k in range(count):
-            i = source[k, column]
-            target[begins[i], 0] = source[k, 0]
-            target[begins[i], 1] = source[k, 1]
-            begins[i] += 1
+@inlined
+def _reaches(grid: Any, bounds: Any, b: int, p: int) -> Any:
+    """How far (m) the centre of a body of class b that overlaps place p may be along x, y and z."""
+    reach = grid.scale[b, _REACH]
+    rx = bounds.extent[0, p] * (1.0 + 16.0 * EPSILON) + reach
+    ry = rx if bounds.balls else bounds.extent[1, p] * (1.0 + 16.0 * EPSILON) + reach
+    rz = rx if bounds.balls else bounds.extent[2, p] * (1.0 + 16.0 * EPSILON) + reach
+    return rx, ry, rz
+
+
+@inlined
+def partners(grid: Any, bounds: Any, a: int, b: int, p: int, found: Any, n: int) -> int:
+    """Append to found[n:] the places of class b that overlap place p of class a; if a == b, each pair only once.
+
+    `found` must have room for all bodies of the class and one more.
+    """
+    mode = grid.layout[b, _MODE]
+    if mode == _DENSE:
+        return _in_dense_cells(grid, bounds, a, b, p, found, n)
+    first, count, inverse = grid.layout[b, _FIRST], grid.layout[b, _COUNT], grid.scale[b, _INVERSE]
+    rx, ry, rz = _reaches(grid, bounds, b, p)
+    rows = (2.0 * ry * inverse + 2.0) * (2.0 * rz * inverse + 2.0)
+    if mode == _WHOLE or (a != b and not rows * (2.0 * rx * inverse + 2.0) < count):
+        low = p + 1 if a == b else first
+        return keep_overlapping(grid, bounds, p, low, first + count, found, n)
+    return _in_hashed_cells(grid, bounds, a, b, p, found, n)
 
 
 @allocating_kernel
 def classify_bodies(size: Any, starts: Any, grid: Any) -> None:
     """Assign bodies with half extents `size` (N,) m to classes, once for many frames."""
-    classify(size, starts, np.empty((_OCTAVES, 2), np.int64), np.empty((_OCTAVES, 2)), grid)
+    classify(size, starts, np.empty((OCTAVES, 2), np.int64), np.empty((OCTAVES, 2)), grid)
     measure_classes(size, grid)
-
-
-@device
-def _sort_boxes(centre: Any, half: Any, starts: Any, grid: Any, extent: Any, scratch: Any) -> None:
-    size, octave, cubes = scratch
-    n = centre.shape[0]
-    lx = ly = lz = np.inf
-    hx = hy = hz = -np.inf
-    for i in range(n):
-        x, y, z = centre[i, 0], centre[i, 1], centre[i, 2]
-        size[i] = max(half[i, 0], half[i, 1], half[i, 2])
-        if not max(abs(x), abs(y), abs(z)) <= LARGEST_BODY:
-            size[i] = np.inf
-        total = half[i, 0] + half[i, 1] + half[i, 2] + x + y + z
-        if total != total or not min(half[i, 0], half[i, 1], half[i, 2]) >= 0.0:
-            size[i] = np.nan
-        if size[i] <= LARGEST_BODY:
-            lx, ly, lz = min(lx, x), min(ly, y), min(lz, z)
-            hx, hy, hz = max(hx, x), max(hy, y), max(hz, z)
-    classify(size, starts, octave, cubes, grid)
-    measure_classes(size, grid)
-    cells = plan_cells(lx, ly, lz, hx, hy, hz, grid)
-    find_buckets(centre, grid, 0, n)
-    sort_by_cell(n, cells, grid)
-    gather_centres(centre, grid, 0, n)
-    for p in range(n):
-        prefetch(half, np.intp(grid.order[min(p + AHEAD, n - 1)]))
-        for c in range(3):
-            extent[c, p] = half[grid.order[p], c]
-
-
-@allocating_kernel
-def sort_boxes(centre: Any, half: Any, starts: Any, grid: Any, extent: Any) -> None:
-    """Sort boxes with centre, half (N, 3) in m by cell: fill `grid`, and extent (3, N + PAD) in its order.
-
-    A box with a NaN or a negative half extent is absent. starts (N,) bool: those that search, see `box_pairs`.
-    """
-    scratch = np.empty(centre.shape[0]), np.empty((_OCTAVES, 2), np.int64), np.empty((_OCTAVES, 2))
-    _sort_boxes(centre, half, starts, grid, extent, scratch)
-
-
-@inlined
-def boxes_at(grid: Any, extent: Any, region: Any, found: Any) -> int:
-    """Write the places of all boxes of a grid that overlap the Region into found (N + 1,); return their number.
-
-    Uses the first place behind the last box.
-    """
-    p = grid.order.size
-    grid.centre[0, p], grid.centre[1, p], grid.centre[2, p] = region.x, region.y, region.z
-    extent[0, p], extent[1, p], extent[2, p] = region.hx, region.hy, region.hz
-    n = 0
-    for k in range(CLASSES):
-        if grid.layout[k, _COUNT] > 0:
-            n = partners(grid, Bounds(extent, False), _ABSENT, k, p, found, n)
-    return n
-
-
-@allocating_kernel
-def _box_pairs(centre: Any, half: Any, starts: Any, grid: Any, pairs: Any) -> int:
-    """Write pairs into pairs (P, 2), sorted unless there are more than P; return their number."""
-    n = centre.shape[0]
-    extent = np.zeros((3, n + PAD))
-    scratch = np.empty(n), np.empty((_OCTAVES, 2), np.int64), np.empty((_OCTAVES, 2))
-    _sort_boxes(centre, half, starts, grid, extent, scratch)
-    found = np.empty(n + PAD, np.int32)
-    total = 0
-    for a in range(STARTING):
-        first, end = places(grid, a)
-        for b in range(CLASSES):
-            if not searches(grid, a, b):
-                continue
-            for p in range(first, end):
-                count = partners(grid, Bounds(extent, False), a, b, p, found, 0)
-                i = grid.order[p]
-                for m in range(count):
-                    if total < pairs.shape[0]:
-                        j = grid.order[found[m]]
-                        pairs[total, 0] = min(i, j)
-                        pairs[total, 1] = max(i, j)
-                    total += 1
-    if total <= pairs.shape[0]:
-        sort_pairs(pairs, total, np.empty((total, 2), np.int32), np.empty(n + 1, np.int32))
-    return total
-
-
-def box_pairs(centre: ArrayLike, half: ArrayLike, starts: ArrayLike | None = None) -> NDArray[np.int32]:
-    """Pairs (M, 2), i < j, sorted, of axis-aligned boxes that overlap or touch: |centre difference| <= sum of halves.
-
-    centre, half extents: (N, 3) m; half extents may be infinite, and a box with a NaN or a negative half extent meets
-    nothing. starts (N,) bool: pairs of two boxes without the flag are omitted and not visited. Raises InputError.
-    """
-    centre = np.ascontiguousarray(centre, dtype=np.float64)
-    half = np.ascontiguousarray(half, dtype=np.float64)
-    n = len(centre)
-    if centre.shape != (n, 3) or half.shape != (n, 3):
-        raise InputError(f"expected centres and half extents of shape (N, 3), got {centre.shape} and {half.shape}")
-    starting = np.ones(n, np.bool_) if starts is None else np.ascontiguousarray(starts, dtype=np.bool_)
-    if starting.shape != (n,):
-        raise InputError(f"starts: expected {n} flags, one for each box, got an array of shape {starting.shape}")
-    grid = make_grid(n)
-    pairs = np.empty((16 * n + 16, 2), np.int32)  # more than most scenes have; unwritten memory costs nothing
-    count = _box_pairs(centre, half, starting, grid, pairs)
-    if count > len(pairs):
-        pairs = np.empty((count, 2), np.int32)
-        _box_pairs(centre, half, starting, grid, pairs)
-    return pairs[:count]

@@ -12,9 +12,9 @@ from typing import Final
 import numpy as np
 
 from collision_monitor.broad_phase.aabb_tree import tree_overlaps
+from collision_monitor.broad_phase.box_pairs import box_pairs
 from collision_monitor.broad_phase.boxes import Array, Indices, box_arrays, in_order, overlaps
 from collision_monitor.broad_phase.brute_force import overlapping_pairs
-from collision_monitor.broad_phase.dense_grid import box_pairs
 from collision_monitor.broad_phase.hashed_grid import make_hashed_grid, put_boxes, query_boxes
 from collision_monitor.broad_phase.kd_tree import kd_tree_overlaps
 from collision_monitor.broad_phase.octree import octree_overlaps

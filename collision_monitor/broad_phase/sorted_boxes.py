@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined
 from collision_monitor._jit.vectors import LANES
-from collision_monitor.broad_phase.dense_grid import PAD, Grid, boxes_at, make_grid, sort_boxes
+from collision_monitor.broad_phase.box_pairs import boxes_at, sort_boxes
+from collision_monitor.broad_phase.dense_grid import PAD, Grid, make_grid
 from collision_monitor.broad_phase.hashed_grid import read_boxes
 from collision_monitor.broad_phase.lanes import boxes_overlap, lowest_bit
 

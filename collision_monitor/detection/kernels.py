@@ -17,9 +17,7 @@ from collision_monitor._jit import device, inlined, kernel, parallel_kernel
 from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.broad_phase.dense_grid import (
     AHEAD,
-    CLASSES,
     PAD,
-    STARTING,
     Bounds,
     Grid,
     find_buckets,
@@ -30,6 +28,7 @@ from collision_monitor.broad_phase.dense_grid import (
     searches,
     sort_by_cell,
 )
+from collision_monitor.broad_phase.size_classes import CLASSES, STARTING
 from collision_monitor.narrow_phase.box_box import axis_direction, sat, touching_features
 from collision_monitor.narrow_phase.contact_row import (
     BOUND,

@@ -21,7 +21,7 @@ from collision_monitor.monitor.active_pairs import ActivePairs
 from collision_monitor.monitor.contacts.mesh_faces import name_mesh_features
 from collision_monitor.monitor.contacts.patches import with_patches
 from collision_monitor.monitor.event_list import EventList
-from collision_monitor.monitor.result import StepResult, StepStatus
+from collision_monitor.monitor.result import Refused, StepResult, StepStatus
 from collision_monitor.monitor.state.roster import count_bodies
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
@@ -117,12 +117,12 @@ class Answers(Stage):
         self.last, self.step_count = result, result.step
         return result
 
-    def none(self) -> StepResult:
+    def none(self, refused: tuple[Refused, ...]) -> StepResult:
         """Return the result of a refused step, without answers: those of the last step would be of another time."""
         last = self.last
         assert last is not None, "the first stamp is always accepted"
         empty = last.contact_rows[:0], last.predictions[:0]
-        return StepResult(last.stamp_ns, last.step, *empty, last.status, accepted=False)
+        return StepResult(last.stamp_ns, last.step, *empty, last.status, accepted=False, refused=refused)
 
     def save(self, snapshot: Snapshot, facts: Facts) -> None:
         """See Stage."""

@@ -51,7 +51,7 @@ class PairBudget:
 
 
 class StepClock:
-    """The steady clock of one monitor's steps: a context, which a caller that publishes the answers enters too.
+    """The steady clock of one monitor's steps: a context, which is entered once for each step.
 
     It learns the cost of a pair, and the duration of the rest of a step after the last pair.
     """
@@ -60,18 +60,14 @@ class StepClock:
         self.cost = [1e-5, 1e-5, 1e-5, 1e-4]  # estimated time for a pair (s), by kind of work
         self.began = self.stopped = 0.0
         self._end = self._deviation = 0.0  # s
-        self._depth = 0
 
     def __enter__(self) -> Self:
-        """Start the clock. Within a running step it continues."""
-        if self._depth == 0:
-            self.began, self.stopped = perf_counter(), 0.0
-        self._depth += 1
+        """Start the clock."""
+        self.began, self.stopped = perf_counter(), 0.0
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._depth -= 1
-        if self._depth == 0 and self.stopped:
+        if self.stopped:
             took = perf_counter() - self.stopped
             if self._end:
                 took = min(took, OUTLIER * (self._end + self._deviation))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor._jit.prefetch import prefetch
-from collision_monitor.broad_phase.dense_grid import box_pairs
+from collision_monitor.broad_phase.box_pairs import box_pairs
 from collision_monitor.broad_phase.hashed_grid import HashedGrid, make_hashed_grid, read_boxes, regridded, remove_boxes
 from collision_monitor.broad_phase.region import regions_overlap
 from collision_monitor.broad_phase.sorted_boxes import SortedBoxes, note_changed, overlapping_boxes, sorted_boxes

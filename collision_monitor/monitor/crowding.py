@@ -11,6 +11,12 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.errors import Refusal
+from collision_monitor.monitor.active_pairs import ActivePairs
+from collision_monitor.monitor.candidates import Candidates
+from collision_monitor.monitor.event_list import EventList
+from collision_monitor.monitor.refusals import Refusals, some_ids
+from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.motion.bodies import BodyTable
 
 MOST_PAIRS: Final = 1_000_000
@@ -36,3 +42,30 @@ def crowded(
     ascending = np.sort(counts)
     first_out = ascending[np.argmax(np.cumsum(ascending) > MOST_PAIRS)]
     return np.flatnonzero(counts >= max(first_out, 1)).astype(np.int32)
+
+
+def leave_out_crowds(
+    step: StepContext,
+    pairs: NDArray[np.int32],
+    active: ActivePairs,
+    events: EventList,
+    candidates: Candidates,
+    refusals: Refusals,
+) -> NDArray[np.int32]:
+    """Return the pairs (P, 2) without those of the bodies beyond MOST_PAIRS, which become unseen until they part."""
+    roster = step.roster
+    out = crowded(roster.bodies, pairs, (active.pairs, events.events), roster.top)
+    if not len(out):
+        return pairs
+    is_out = np.zeros(roster.top, np.bool_)
+    is_out[out] = True
+    refusals.add(
+        Refusal.MALFORMED,
+        f"expected at most {MOST_PAIRS:,} pairs of objects that may meet, got {len(pairs):,}: the {len(out):,} "
+        f"objects with the most pairs (ids {some_ids(roster.bodies.id[out])}) are unseen until they part",
+        len(out),
+    )
+    roster.forget_states(out)
+    candidates.forget(out)
+    active.end_of(is_out)
+    return pairs.compress(~is_out[pairs].any(axis=1), axis=0)

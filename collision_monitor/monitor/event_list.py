@@ -209,6 +209,14 @@ class EventList(Stage):
         self.events = self.events[passed:]
         return due[:n]
 
+    def take_due_with(self, new: Events, version: Versions, now: float) -> tuple[Events, Events]:
+        """Remove the events due by `now`. Return them with those of `new` that are due, and the others of `new`."""
+        due = self.take_due(version, now)
+        if not len(new):
+            return due, new
+        is_due = new["lower"] <= now
+        return both(due, new.compress(is_due)), new.compress(~is_due)
+
     def until(self, time: float) -> Events:
         """The events with `lower` <= time (s): a view."""
         return self.events[: count_until(self.events, time)]

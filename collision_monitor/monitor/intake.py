@@ -1,24 +1,25 @@
-"""Stage 1, intake: convert the arguments of a step to states, and store each state or refuse it with a reason."""
+"""Stage 1, intake: convert the arguments of a step to states, advance the time, and store or refuse each state."""
 
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor import records
-from collision_monitor._jit import device, kernel
+from collision_monitor._jit import device, inlined, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor.errors import InputError, Refusal
-from collision_monitor.monitor.result import Refused
+from collision_monitor.monitor.refusals import Refusals, some_ids
 from collision_monitor.monitor.state.roster import Roster
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
-from collision_monitor.monitor.state.timeline import Order
+from collision_monitor.monitor.state.timeline import NANOSECOND, Order, Progress, Timeline
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
 from collision_monitor.records import StateFlag
 from collision_monitor.settings.by_name import classes_of
+from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.planar import flat_states
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 from collision_monitor.uncertainty.spread import worst_stddevs
@@ -30,9 +31,8 @@ QUATERNION: Final = 3
 OLD: Final = 4
 LEFT_OUT: Final = 5
 
-MOST_REFUSAL_TEXT: Final = 1000
-"""Longest text of a refusal that is kept (characters), because a text may quote a string of a message, and every status
-repeats the last one."""
+MOST_NANOSECONDS: Final = 2**63
+"""A stamp is below it, and from its negative on; the stamps of messages and sessions are of 64 bits."""
 
 STATE_NUMBERS: Final = 20
 """float64 numbers at the front of a records.STATE; id and flags follow."""
@@ -66,44 +66,44 @@ _VERDICTS: Final = {
 States = NDArray[np.void]
 
 
-class Intake(Stage):
-    """Stores states in the roster, counts the refused inputs by reason, and keeps the texts of the last refusals."""
+class Observation(NamedTuple):
+    """The arguments of `Monitor.step`, as they were given."""
 
-    SAVED = ("refused", "texts", "last_refusal")
-    CACHES = ("_buffer", "of_step")
+    stamp_ns: int
+    ids: ArrayLike
+    poses: Any = None
+    twists: Any = None
+    covariance: Any = None
+    now_ns: int | None = None
+
+
+class Observed(NamedTuple):
+    """What a step observes: the arguments of a step, checked."""
+
+    stamp_ns: int
+    now_ns: int | None
+    states: States  # (N,) records.STATE
+    covariances: NDArray[np.float64]  # (N, 12), or (0, 12): none
+
+
+class Intake(Stage):
+    """Stores states in the roster. Keeps no state but the memory in which it aligns those of messages."""
+
+    CACHES = ("_buffer",)
 
     def __init__(self) -> None:
-        self.refused: dict[Refusal, int] = dict.fromkeys(Refusal, 0)
-        self.texts: dict[Refusal, str] = dict.fromkeys(Refusal, "")
-        self.last_refusal = ""
-        self.of_step: dict[Refusal, Refused] = {}
-        """The refusals since the last step began."""
         self._buffer = np.empty(64, records.STATE)
 
-    def refuse(self, reason: Refusal, text: str, count: int = 1) -> None:
-        """Count refused inputs; `text` describes the last of these."""
-        self.refused[reason] += count
-        self.last_refusal = text if len(text) <= MOST_REFUSAL_TEXT else f"{text[: MOST_REFUSAL_TEXT - 1]}…"
-        self.texts[reason] = self.last_refusal
-        before = self.of_step[reason].count if reason in self.of_step else 0
-        self.of_step[reason] = Refused(reason, before + count, self.last_refusal)
+    def checked(self, given: Observation) -> Observed:
+        """Check the arguments of a step, and convert them. The caller's arrays are not changed. Raises InputError."""
+        stamp_ns = checked_nanoseconds(given.stamp_ns, "stamp_ns")
+        now_ns = None if given.now_ns is None else checked_nanoseconds(given.now_ns, "now_ns")
+        return Observed(stamp_ns, now_ns, *self._states(*given[1:5]))
 
-    def order(self, states: States, time: float, late: bool, roster: Roster) -> Order:
-        """Return how a message of these states stands to what the roster has. late: its `time` (s) is stale already."""
-        bodies, slots = roster.bodies, roster.slots_of(states["id"])
-        slots = slots[slots >= 0]
-        moving = slots[~bodies.static[slots]]
-        if (bodies.seen[moving] & (bodies.time[moving] > time)).any():
-            return Order.OLD
-        return Order.LATE if late and len(moving) else Order.IN_ORDER
+    def _states(self, ids: ArrayLike, poses: Any, twists: Any, covariance: Any) -> tuple[States, NDArray[np.float64]]:
+        """Return the states (N,) records.STATE and the covariances (N, 12), or (0, 12). Raises InputError.
 
-    def states(
-        self, ids: ArrayLike, poses: Any, twists: Any, covariance: Any
-    ) -> tuple[States, NDArray[np.float64]]:
-        """Convert the arguments of `Monitor.step` to states (N,) records.STATE and covariances (N, 12), or (0, 12).
-
-        With covariances, the states get the standard deviations along their worst axes. The caller's arrays are not
-        changed. Raises InputError.
+        With covariances, the states get the standard deviations along their worst axes.
         """
         try:
             given = np.asarray(ids)
@@ -140,19 +140,46 @@ class Intake(Stage):
         states.view(np.uint8)[:] = np.ascontiguousarray(given).view(np.uint8)  # message bytes need not be aligned
         return states
 
+    def advance(
+        self, seen: Observed, timeline: Timeline, roster: Roster, profile: Profile, refusals: Refusals
+    ) -> Progress:
+        """Move the timeline to the stamp of the states, or refuse the stamp. A restart is noted as a refusal too."""
+        stamp_ns, states, p = seen.stamp_ns, seen.states, profile
+        seconds = (stamp_ns - timeline.now_ns) * NANOSECOND
+        order = Order.IN_ORDER
+        if timeline.is_behind(stamp_ns):
+            order = _order(states, timeline.seconds(stamp_ns), -seconds > p.stale_after, roster)
+        progress = timeline.advance(stamp_ns, order, p.max_time_step, p.stale_after)
+        if progress is Progress.RESTARTS:
+            refusals.add(
+                Refusal.TIME,
+                f"time jumped by {seconds:+.3f} s, as a second message confirmed: the timeline restarts there, and "
+                "every moving object is unseen until its next state",
+                count=0,
+            )
+        elif progress is Progress.REFUSED:
+            about = f" of object {some_ids(states['id'])}" if len(states) else ""
+            refusals.add(
+                Refusal.TIME,
+                f"stamp{about}: expected within {p.max_time_step:g} s of the last one, got "
+                f"{seconds:+.3f} s; the next message restarts the clock there if it agrees",
+            )
+        return progress
+
     def take(
         self,
-        states: States,
-        covariances: NDArray[np.float64],
+        seen: Observed,
         time: float,
         roster: Roster,
         uncertain: UncertainPredictions,
-        rate_by_name: str = "",
+        rate_by_name: str,
+        refusals: Refusals,
     ) -> None:
         """Store usable states as their bodies' last ones at `time` (s), with their uncertainties. Refuse the others.
 
         rate_by_name: the setting. States of a class that come sooner are left out, without a refusal.
         """
+        states = seen.states
         if len(states) == 0:
             return
         slots = roster.slots_of(states["id"])
@@ -164,7 +191,7 @@ class Intake(Stage):
         accepted, is_uncertain = take_states(roster.bodies, slots, numbers, flags, time, rates, verdicts)
         if is_uncertain or uncertain.active:
             taken = np.where(verdicts == ACCEPTED, slots, np.int32(-1))
-            uncertain.take(taken, numbers, flags, covariances, roster.planar)
+            uncertain.take(taken, numbers, flags, seen.covariances, roster.planar)
         if accepted == len(states):
             return
         for verdict, (reason, text) in _VERDICTS.items():
@@ -173,19 +200,33 @@ class Intake(Stage):
                 row = states[rows[0]]
                 values = {"id": int(row["id"]), "quaternion": row["quaternion"].tolist(), "unusable": _unusable(row)}
                 values["age"] = _age_text(roster, int(slots[rows[0]]), time) if verdict == OLD else ""
-                self.refuse(reason, text.format(**values), len(rows))
+                refusals.add(reason, text.format(**values), len(rows))
 
     def save(self, snapshot: Snapshot, facts: Facts) -> None:
-        """See Stage."""
-        facts["refused"] = {reason.value: count for reason, count in self.refused.items()}
-        facts["refusals"] = {reason.value: text for reason, text in self.texts.items()}
-        facts["last_refusal"] = self.last_refusal
+        """See Stage: there is nothing to save."""
 
     def restore(self, snapshot: Snapshot, facts: Facts) -> None:
-        """See Stage."""
-        self.refused = {reason: facts["refused"][reason.value] for reason in Refusal}
-        self.texts = {reason: facts["refusals"][reason.value] for reason in Refusal}
-        self.last_refusal = facts["last_refusal"]
+        """See Stage: there is nothing to restore."""
+
+
+def checked_nanoseconds(value: Any, name: str) -> int:
+    """Return a time as int. Raises InputError."""
+    if not isinstance(value, int | np.integer) or isinstance(value, bool):
+        got = f"got {value!r:.100}; of seconds t write round(1e9 * t)"
+        raise InputError(f"{name}: expected an integer number of nanoseconds, {got}")
+    if not -MOST_NANOSECONDS <= value < MOST_NANOSECONDS:
+        raise InputError(f"{name}: expected nanoseconds that 64 bits can hold, got {value}")
+    return int(value)
+
+
+def _order(states: States, time: float, late: bool, roster: Roster) -> Order:
+    """Return how a message of these states stands to what the roster has. late: its `time` (s) is stale already."""
+    bodies, slots = roster.bodies, roster.slots_of(states["id"])
+    slots = slots[slots >= 0]
+    moving = slots[~bodies.static[slots]]
+    if (bodies.seen[moving] & (bodies.time[moving] > time)).any():
+        return Order.OLD
+    return Order.LATE if late and len(moving) else Order.IN_ORDER
 
 
 def _unusable(row: np.void) -> str:
@@ -246,62 +287,74 @@ def take_states(bodies, slots, numbers, flags, time, rates, verdicts):
     uncertain = False
     for k in range(slots.size):
         i = slots[k]
-        if i < 0:
-            verdicts[k] = UNKNOWN_ID
+        verdicts[k] = _verdict(bodies, i, numbers, k, flags[k], time, rates)
+        if verdicts[k] != ACCEPTED:
             continue
-        known_twist = (flags[k] & _TWIST_UNKNOWN) == 0
-        usable = True
-        for c in range(13 if known_twist else 7):
-            usable &= abs(numbers[k, c]) <= LARGEST_INPUT
-        accelerates = (flags[k] & _ACCELERATION_VALID) != 0
-        for c in range(13, 16 if accelerates else 13):
-            usable &= abs(numbers[k, c]) <= LARGEST_INPUT
-        for c in range(16, STATE_NUMBERS):  # standard deviations; NaN: unknown
-            usable &= not (numbers[k, c] < 0.0 or numbers[k, c] > LARGEST_INPUT)
-        if not usable:
-            verdicts[k] = NON_FINITE
-            continue
-        x, y, z, w = numbers[k, 3], numbers[k, 4], numbers[k, 5], numbers[k, 6]
-        norm = sqrt(x * x + y * y + z * z + w * w)
-        if not abs(norm - 1.0) <= UNIT_QUATERNION:
-            verdicts[k] = QUATERNION
-            continue
-        if bodies.static[i] or (bodies.seen[i] and time <= bodies.time[i]):
-            verdicts[k] = OLD
-            continue
-        is_soon = bodies.seen[i] and (time - bodies.time[i]) * rates[i] < EARLY and rates[i] < inf
-        if is_soon and (flags[k] & _DISCONTINUITY) == 0:
-            verdicts[k] = LEFT_OUT
-            continue
-        x, y, z, w = x / norm, y / norm, z / norm, w / norm
-        if known_twist:
-            for c in range(3):
-                bodies.linear[i, c] = numbers[k, 7 + c]
-                bodies.angular[i, c] = numbers[k, 10 + c]
-        elif bodies.seen[i] and (flags[k] & _DISCONTINUITY) == 0:
-            _estimate_twist(bodies, i, numbers[k, :3], (x, y, z, w), time - bodies.time[i])
-            for c in range(3 if accelerates else 0):
-                # the estimate is the mean velocity since the last state, which the body had half-way
-                bodies.linear[i, c] += 0.5 * numbers[k, 13 + c] * (time - bodies.time[i])
-            for c in (_POSITION_STDDEV, _ORIENTATION_STDDEV):
-                if numbers[k, c] > 0.0 and not numbers[k, c + 2] > 0.0:
-                    # of the difference of two poses; assumes that the last one was as uncertain as this one
-                    numbers[k, c + 2] = sqrt(2.0) * numbers[k, c] / (time - bodies.time[i])
-        else:
-            bodies.linear[i] = 0.0
-            bodies.angular[i] = 0.0
-        for c in range(3):
-            bodies.acceleration[i, c] = numbers[k, 13 + c] if accelerates else 0.0
-            bodies.position[i, c] = numbers[k, c]
-        bodies.quaternion[i, 0], bodies.quaternion[i, 1] = x, y
-        bodies.quaternion[i, 2], bodies.quaternion[i, 3] = z, w
-        bodies.time[i] = time
-        bodies.seen[i] = True
-        verdicts[k] = ACCEPTED
+        _store(bodies, i, numbers, k, flags[k], time)
         accepted += 1
         for c in range(16, STATE_NUMBERS):
             uncertain |= numbers[k, c] > 0.0
     return accepted, uncertain
+
+
+@inlined
+def _norm(numbers, k):
+    """Length of the quaternion in row k."""
+    x, y, z, w = numbers[k, 3], numbers[k, 4], numbers[k, 5], numbers[k, 6]
+    return sqrt(x * x + y * y + z * z + w * w)
+
+
+@inlined
+def _verdict(bodies, i, numbers, k, flags, time, rates):
+    """What becomes of the state in row k, of body i: ACCEPTED, LEFT_OUT or the reason of the refusal."""
+    if i < 0:
+        return UNKNOWN_ID
+    usable = True
+    for c in range(13 if (flags & _TWIST_UNKNOWN) == 0 else 7):
+        usable &= abs(numbers[k, c]) <= LARGEST_INPUT
+    for c in range(13, 16 if (flags & _ACCELERATION_VALID) != 0 else 13):
+        usable &= abs(numbers[k, c]) <= LARGEST_INPUT
+    for c in range(16, STATE_NUMBERS):  # standard deviations; NaN: unknown
+        usable &= not (numbers[k, c] < 0.0 or numbers[k, c] > LARGEST_INPUT)
+    if not usable:
+        return NON_FINITE
+    if not abs(_norm(numbers, k) - 1.0) <= UNIT_QUATERNION:
+        return QUATERNION
+    if bodies.static[i] or (bodies.seen[i] and time <= bodies.time[i]):
+        return OLD
+    is_soon = bodies.seen[i] and (time - bodies.time[i]) * rates[i] < EARLY and rates[i] < inf
+    return LEFT_OUT if is_soon and (flags & _DISCONTINUITY) == 0 else ACCEPTED
+
+
+@inlined
+def _store(bodies, i, numbers, k, flags, time):
+    """Make the state in row k the last one of body i."""
+    accelerates = (flags & _ACCELERATION_VALID) != 0
+    norm = _norm(numbers, k)
+    x, y, z, w = numbers[k, 3] / norm, numbers[k, 4] / norm, numbers[k, 5] / norm, numbers[k, 6] / norm
+    if (flags & _TWIST_UNKNOWN) == 0:
+        for c in range(3):
+            bodies.linear[i, c] = numbers[k, 7 + c]
+            bodies.angular[i, c] = numbers[k, 10 + c]
+    elif bodies.seen[i] and (flags & _DISCONTINUITY) == 0:
+        _estimate_twist(bodies, i, numbers[k, :3], (x, y, z, w), time - bodies.time[i])
+        for c in range(3 if accelerates else 0):
+            # the estimate is the mean velocity since the last state, which the body had half-way
+            bodies.linear[i, c] += 0.5 * numbers[k, 13 + c] * (time - bodies.time[i])
+        for c in (_POSITION_STDDEV, _ORIENTATION_STDDEV):
+            if numbers[k, c] > 0.0 and not numbers[k, c + 2] > 0.0:
+                # of the difference of two poses; assumes that the last one was as uncertain as this one
+                numbers[k, c + 2] = sqrt(2.0) * numbers[k, c] / (time - bodies.time[i])
+    else:
+        bodies.linear[i] = 0.0
+        bodies.angular[i] = 0.0
+    for c in range(3):
+        bodies.acceleration[i, c] = numbers[k, 13 + c] if accelerates else 0.0
+        bodies.position[i, c] = numbers[k, c]
+    bodies.quaternion[i, 0], bodies.quaternion[i, 1] = x, y
+    bodies.quaternion[i, 2], bodies.quaternion[i, 3] = z, w
+    bodies.time[i] = time
+    bodies.seen[i] = True
 
 
 @device

@@ -59,9 +59,10 @@ class TimeCritical(Stage):
             return TimeBudget(self.clock, 1e-3 * p.budget_ms, p.pairs_per_step)
         return PairBudget(p.pairs_per_step) if self.has_budget(p) or self._deferred else None
 
-    def end_step(self, step: StepContext) -> None:
-        """Store how many pairs the step deferred."""
+    def end_step(self, step: StepContext, budget: PairBudget | None) -> int | None:
+        """Store how many pairs the step deferred. Return how many it examined before that; None: it deferred none."""
         self._deferred = step.work.deferred
+        return budget.done if budget is not None and self._deferred else None
 
     def prepare(self, step: StepContext, impacts: FirstImpacts) -> None:
         """Make the trees and load the kernels that steps with a budget may need, so that no step waits for them."""

@@ -13,7 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device, kernel
+from collision_monitor._jit import device, inlined, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor.broad_phase.hashed_grid import HashedGrid, put_box, remove_boxes
 from collision_monitor.monitor import filters
@@ -173,7 +173,6 @@ def find_moved(bodies, uncertainty, count, seconds, settings, columns, found):
     `make_columns`.
     """
     now, horizons = seconds
-    sigmas = uncertainty.sigmas
     stale_acceleration = settings.stale_acceleration
     moved, ending = found[0], found[1]
     n = n_ending = moving = 0
@@ -186,39 +185,14 @@ def find_moved(bodies, uncertainty, count, seconds, settings, columns, found):
         moving += 1
         m, horizon = bodies.motion[i], horizons[i]
         age = now - bodies.time[i]
-        since = now - m.time
-        dx = bodies.position[i, 0] - m.x + (bodies.linear[i, 0] * age - m.vx * since)
-        dy = bodies.position[i, 1] - m.y + (bodies.linear[i, 1] * age - m.vy * since)
-        dz = bodies.position[i, 2] - m.z + (bodies.linear[i, 2] * age - m.vz * since)
-        ux, uy, uz = bodies.linear[i, 0] - m.vx, bodies.linear[i, 1] - m.vy, bodies.linear[i, 2] - m.vz
-        ax, ay, az = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]
-        harder = 0.0
-        if ax != 0.0 or ay != 0.0 or az != 0.0 or m.ax != 0.0 or m.ay != 0.0 or m.az != 0.0:
-            dx += 0.5 * (ax * age * age - m.ax * since * since)
-            dy += 0.5 * (ay * age * age - m.ay * since * since)
-            dz += 0.5 * (az * age * age - m.az * since * since)
-            ux, uy, uz = ux + (ax * age - m.ax * since), uy + (ay * age - m.ay * since), uz + (az * age - m.az * since)
-            harder = sqrt((ax - m.ax) ** 2 + (ay - m.ay) ** 2 + (az - m.az) ** 2)
-        apart = sqrt(dx * dx + dy * dy + dz * dz)
-        # half the difference of accelerations, over two horizons: a body is predicted at most that far
-        drift = sqrt(ux * ux + uy * uy + uz * uz) + harder * horizon
-        if age > 0.0:
-            apart += 0.5 * stale_acceleration * age * age
-            drift += stale_acceleration * age
-        r = bodies.spin_radius[i]
-        if r > 0.0 and apart <= m.tube_0 and drift <= m.tube_1:
-            dx, dy, dz = bodies.angular[i, 0] - m.wx, bodies.angular[i, 1] - m.wy, bodies.angular[i, 2] - m.wz
-            off = sqrt(dx * dx + dy * dy + dz * dz)
-            drift += r * off
-            # the angle is of the last state's time; from then to now it grows at most by the difference of the rates
-            apart += r * (angles[i % BLOCK] + off * age)
+        apart, drift = _deviation(bodies, i, now, horizon, stale_acceleration, angles[i % BLOCK])
         if not (apart <= m.tube_0 and drift <= m.tube_1):
             if bodies.slack[i] > 0.0:  # 0: the body is new
                 bodies.slack[i] = max(0.5 * bodies.slack[i], SHORTEST_SLACK * horizon)
             moved[n] = i
             n += 1
         elif _is_wide_without_need(bodies, i, age, settings) or (
-            sigmas > 0.0 and not _is_covered(bodies, uncertainty, i, now, horizon, stale_acceleration)
+            uncertainty.sigmas > 0.0 and not _is_covered(bodies, uncertainty, i, now, horizon, stale_acceleration)
         ):
             moved[n] = i
             n += 1
@@ -227,6 +201,43 @@ def find_moved(bodies, uncertainty, count, seconds, settings, columns, found):
             ending[n_ending] = i
             n_ending += 1
     return n, n_ending, moving
+
+
+@inlined
+def _deviation(bodies, i, now, horizon, stale_acceleration, angle):
+    """How far (m) the surface of body i is from its reference motion, and how fast (m/s) it drifts from it, at most.
+
+    angle: by which the body's last orientation is turned from that of its reference motion (rad). If the origin alone
+    has left the motion, its surface is not computed.
+    """
+    m = bodies.motion[i]
+    age, since = now - bodies.time[i], now - m.time
+    dx = bodies.position[i, 0] - m.x + (bodies.linear[i, 0] * age - m.vx * since)
+    dy = bodies.position[i, 1] - m.y + (bodies.linear[i, 1] * age - m.vy * since)
+    dz = bodies.position[i, 2] - m.z + (bodies.linear[i, 2] * age - m.vz * since)
+    ux, uy, uz = bodies.linear[i, 0] - m.vx, bodies.linear[i, 1] - m.vy, bodies.linear[i, 2] - m.vz
+    ax, ay, az = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]
+    harder = 0.0
+    if ax != 0.0 or ay != 0.0 or az != 0.0 or m.ax != 0.0 or m.ay != 0.0 or m.az != 0.0:
+        dx += 0.5 * (ax * age * age - m.ax * since * since)
+        dy += 0.5 * (ay * age * age - m.ay * since * since)
+        dz += 0.5 * (az * age * age - m.az * since * since)
+        ux, uy, uz = ux + (ax * age - m.ax * since), uy + (ay * age - m.ay * since), uz + (az * age - m.az * since)
+        harder = sqrt((ax - m.ax) ** 2 + (ay - m.ay) ** 2 + (az - m.az) ** 2)
+    apart = sqrt(dx * dx + dy * dy + dz * dz)
+    # half the difference of accelerations, over two horizons: a body is predicted at most that far
+    drift = sqrt(ux * ux + uy * uy + uz * uz) + harder * horizon
+    if age > 0.0:
+        apart += 0.5 * stale_acceleration * age * age
+        drift += stale_acceleration * age
+    r = bodies.spin_radius[i]
+    if r > 0.0 and apart <= m.tube_0 and drift <= m.tube_1:
+        dx, dy, dz = bodies.angular[i, 0] - m.wx, bodies.angular[i, 1] - m.wy, bodies.angular[i, 2] - m.wz
+        off = sqrt(dx * dx + dy * dy + dz * dz)
+        drift += r * off
+        # the angle is of the last state's time; from then to now it grows at most by the difference of the rates
+        apart += r * (angle + off * age)
+    return apart, drift
 
 
 @device

@@ -7,6 +7,7 @@ cover the mesh's surface, and computes the largest distance of a point of the pa
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from importlib import import_module
 from typing import Any, Final, NamedTuple
 
@@ -109,12 +110,7 @@ def convex_decomposition(mesh: Mesh, concavity: float = CONCAVITY) -> Decomposit
     solid = abs(Hull(vertices, welded.astype(np.int64)).volume)
     if not solid > THINNEST * convex_hull((used - center) / (size or 1.0)).volume:  # raises ShapeError if it is flat
         raise ShapeError("convex decomposition: expected a mesh with an inside, got one without volume")
-    hulls = []
-    for points, _ in coacd.run_coacd(coacd.Mesh(vertices, welded), threshold=concavity, seed=SEED):
-        try:
-            hulls.append(convex_hull(points))
-        except ShapeError:
-            continue  # a flat part contains nothing that its neighbours do not
+    hulls = _solid_parts(coacd.run_coacd(coacd.Mesh(vertices, welded), threshold=concavity, seed=SEED))
     faces = list(vertices[welded])
     grown = COVERED
     for _ in range(MOST_GROWTHS):
@@ -138,6 +134,17 @@ def convex_decomposition(mesh: Mesh, concavity: float = CONCAVITY) -> Decomposit
         surface_error=size * _farthest(outer, vertices[welded]),
         volume_error=sum(hull.volume for hull in hulls) / solid - 1.0,
     )
+
+
+def _solid_parts(found: Iterable[tuple[Array, Any]]) -> list[Hull]:
+    """Return the hulls of the parts that CoACD found, points and faces of each."""
+    hulls = []
+    for points, _ in found:
+        try:
+            hulls.append(convex_hull(points))
+        except ShapeError:
+            continue  # a flat part contains nothing that its neighbours do not
+    return hulls
 
 
 def _planes(hull: Hull) -> tuple[Array, Array]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final
@@ -18,8 +18,6 @@ from collision_monitor.alerts.rules import Rules
 from collision_monitor.codec import (
     Change,
     MonitorStatus,
-    ObjectStateArray,
-    decode_states,
     encode_alert,
     encode_alerts,
     encode_contacts,
@@ -27,16 +25,13 @@ from collision_monitor.codec import (
     encode_predictions,
     encode_status,
 )
-from collision_monitor.codec.states import COVARIANCE_SIZE
 from collision_monitor.errors import InputError, MessageError, Refusal
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.monitor.state.snapshot import Snapshot
 from collision_monitor.pipeline.catalogue import Catalogue
-from collision_monitor.pipeline.frames import is_in_frame
 from collision_monitor.pipeline.preparation import Preparation
 from collision_monitor.pipeline.provenance import provenance
-from collision_monitor.pipeline.sequence import LostMessages
 from collision_monitor.pipeline.settings_event import (
     LIMIT,
     NOW,
@@ -46,6 +41,7 @@ from collision_monitor.pipeline.settings_event import (
     encode_settings,
 )
 from collision_monitor.pipeline.shape_intake import ShapeIntake, TakenShapes
+from collision_monitor.pipeline.state_intake import ReceivedStates, StateIntake
 from collision_monitor.settings.profile import Profile
 
 Records = NDArray[np.void]
@@ -98,7 +94,7 @@ class Pipeline:
         self.catalogue = Catalogue()
         self.frame_id = frame_id
         self._shapes = ShapeIntake(self.monitor, self.catalogue, frame_id, preparation)
-        self._lost = LostMessages()
+        self._states = StateIntake(self.monitor, frame_id)
         self._alerts = Alerts(rules)
         self._kept = frozenset(kept)
         self._limit = self.monitor.profile.pairs_per_step  # the value that a replay has
@@ -111,34 +107,22 @@ class Pipeline:
 
         now_ns: when the answers will be there, see `Monitor.step`. In a replay the recording holds it.
         """
+        return self.take_states(ReceivedStates.decode(data), now_ns)
+
+    def take_states(
+        self, states: ReceivedStates, now_ns: int | None = None, publish: Callable[[Outputs], None] | None = None
+    ) -> Outputs | None:
+        """Process an ObjectStateArray as `on_states` does. publish: gets the answers within the budget of the step."""
         recorded, self._now = self._now, None
         now_ns = recorded if now_ns is None else now_ns
         with self.monitor.clock:
-            message = self._decode_states(data)
-            if message is None:
+            result = self._states.take(states, now_ns)
+            if result is None:
                 return None
-            covariance = message.covariance.reshape(-1, COVARIANCE_SIZE) if len(message.covariance) else None
-            result = self.monitor.step(message.stamp_ns, message.states, covariance=covariance, now_ns=now_ns)
-            return self._encode(result, now_ns) if result.accepted else None
-
-    def _decode_states(self, data: bytes) -> ObjectStateArray | None:
-        """Return the message; None if it was refused."""
-        try:
-            message = decode_states(data)
-        except MessageError as error:
-            self.monitor.refuse(Refusal.MALFORMED, str(error))
-            return None
-        self._lost.receive(message.sequence)
-        if not is_in_frame(self.monitor, self.frame_id, message.frame_id, "ObjectStateArray"):
-            return None
-        if len(message.covariance) not in (0, COVARIANCE_SIZE * len(message.states)):
-            self.monitor.refuse(
-                Refusal.MALFORMED,
-                f"ObjectStateArray.covariance: expected none or {COVARIANCE_SIZE} numbers for each of "
-                f"{len(message.states)} states, got {len(message.covariance)}",
-            )
-            return None
-        return message
+            outputs = self._encode(result, now_ns)
+            if publish is not None:
+                publish(outputs)
+            return outputs
 
     def _encode(self, result: StepResult, now_ns: int | None) -> Outputs:
         header = result.stamp_ns, self.frame_id, result.step
@@ -253,6 +237,36 @@ class Pipeline:
         """The classes of the rules that no object belongs to, as of the last step."""
         return self._alerts.empty_classes
 
+    # -- what the monitor says of its inputs
+
+    @property
+    def profile(self) -> Profile:
+        """The settings in force."""
+        return self.monitor.profile
+
+    @property
+    def refused(self) -> Mapping[Refusal, int]:
+        """Number of refused inputs by reason."""
+        return self.monitor.refused
+
+    @property
+    def refusal_texts(self) -> Mapping[Refusal, str]:
+        """Text of the last refusal by reason, see `Monitor.refusal_texts`."""
+        return self.monitor.refusal_texts
+
+    @property
+    def restarts(self) -> int:
+        """Number of times that the timeline restarted because time jumped."""
+        return self.monitor.restarts
+
+    def stale(self) -> dict[int, str]:
+        """Return the names of the objects that are stale at the latest time, by id."""
+        return {object_id: self.monitor.name(object_id) for object_id in self.monitor.stale_ids}
+
+    def unseen(self) -> dict[int, str]:
+        """Return the names of the moving objects without any state, by id."""
+        return {object_id: self.monitor.name(object_id) for object_id in self.monitor.unseen_ids}
+
     # -- status and metadata
 
     def status(self, *, silent: bool = False, **live: Any) -> bytes:
@@ -277,7 +291,7 @@ class Pipeline:
                 version=VERSION,
                 profile=monitor.profile.name,
                 last_refusal=self._shapes.last_refusal,
-                messages_lost=self._lost.count,
+                messages_lost=self._states.lost,
                 **values,
                 **live,
             )
@@ -298,7 +312,7 @@ class Pipeline:
         """Return a copy of all state that later answers depend on. Takes 0.3 ms for 200 objects."""
         snapshot = self.monitor.snapshot()
         snapshot.facts[_PIPELINE] = {
-            **self._lost.facts(),
+            **self._states.facts(),
             **self.catalogue.facts(),
             "profile": {**self.monitor.profile.to_dict(), LIMIT: self._limit},
         }
@@ -318,7 +332,7 @@ class Pipeline:
             profile = Profile.from_dict({**facts["profile"], **settings})
             pipeline = cls(profile, frame_id, timed=False, kept=settings)
             pipeline.monitor = Monitor.restored(profile, snapshot, warns=False)
-            pipeline._lost = LostMessages(facts["messages_lost"], facts["sequence"])
+            pipeline._states = StateIntake.restored(pipeline.monitor, frame_id, facts)
             pipeline.catalogue = Catalogue.restored(facts)
             pipeline._shapes = ShapeIntake(pipeline.monitor, pipeline.catalogue, frame_id, None)
             if _ALERTS in snapshot.facts:

@@ -18,8 +18,8 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled
 from collision_monitor.objects.preparation_cost import BOXES_MS, Budget, is_quick
 from collision_monitor.pipeline.catalogue import Catalogue
-from collision_monitor.pipeline.frames import is_in_frame
 from collision_monitor.pipeline.preparation import STAYS, Job, Preparation
+from collision_monitor.pipeline.state_intake import is_in_frame
 from collision_monitor.records import Model
 
 Budgets = tuple[Budget, Budget]

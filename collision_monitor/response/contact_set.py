@@ -128,32 +128,7 @@ def _solve(
 ) -> int:  # fmt: skip
     """Row (M, 12): three directions (normal and two sideways), and for each the inverse of its response to a push."""
     for k in range(len(a)):
-        x, y, z = normal[k, 0], normal[k, 1], normal[k, 2]
-        # sideways directions: the axis least along the normal, made perpendicular
-        ux, uy, uz = (1.0, 0.0, 0.0) if abs(x) <= abs(y) and abs(x) <= abs(z) else (
-            (0.0, 1.0, 0.0) if abs(y) <= abs(z) else (0.0, 0.0, 1.0)
-        )  # fmt: skip
-        tx, ty, tz = y * uz - z * uy, z * ux - x * uz, x * uy - y * ux
-        length = (tx * tx + ty * ty + tz * tz) ** 0.5
-        tx, ty, tz = tx / length, ty / length, tz / length
-        row[k, 0], row[k, 1], row[k, 2] = x, y, z
-        row[k, 3], row[k, 4], row[k, 5] = tx, ty, tz
-        row[k, 6], row[k, 7], row[k, 8] = y * tz - z * ty, z * tx - x * tz, x * ty - y * tx
-        for axis in range(3):
-            response = 0.0
-            for body, arm in ((a[k], arm_a), (b[k], arm_b)):
-                response += inverse_mass[body]
-                dx, dy, dz = row[k, 3 * axis], row[k, 3 * axis + 1], row[k, 3 * axis + 2]
-                rx, ry, rz = arm[k, 0], arm[k, 1], arm[k, 2]
-                cx, cy, cz = ry * dz - rz * dy, rz * dx - rx * dz, rx * dy - ry * dx
-                for i in range(3):
-                    c = cx if i == 0 else (cy if i == 1 else cz)
-                    response += c * (
-                        inverse_inertia[body, i, 0] * cx
-                        + inverse_inertia[body, i, 1] * cy
-                        + inverse_inertia[body, i, 2] * cz
-                    )
-            row[k, 9 + axis] = 1.0 / response if response > 0.0 else 0.0
+        _lay_row(inverse_mass, inverse_inertia, a, b, normal, arm_a, arm_b, row, k)
         for axis in range(3):
             if impulse[k, axis] != 0.0:
                 size = impulse[k, axis]
@@ -189,6 +164,39 @@ def _solve(
         if change <= tolerance:
             break
     return used
+
+
+@device
+def _lay_row(
+    inverse_mass: Any, inverse_inertia: Any, a: Any, b: Any, normal: Any, arm_a: Any, arm_b: Any, row: Any, k: int
+) -> None:
+    """Write the row of contact k, see `_solve`."""
+    x, y, z = normal[k, 0], normal[k, 1], normal[k, 2]
+    # sideways directions: the axis least along the normal, made perpendicular
+    ux, uy, uz = (1.0, 0.0, 0.0) if abs(x) <= abs(y) and abs(x) <= abs(z) else (
+        (0.0, 1.0, 0.0) if abs(y) <= abs(z) else (0.0, 0.0, 1.0)
+    )  # fmt: skip
+    tx, ty, tz = y * uz - z * uy, z * ux - x * uz, x * uy - y * ux
+    length = (tx * tx + ty * ty + tz * tz) ** 0.5
+    tx, ty, tz = tx / length, ty / length, tz / length
+    row[k, 0], row[k, 1], row[k, 2] = x, y, z
+    row[k, 3], row[k, 4], row[k, 5] = tx, ty, tz
+    row[k, 6], row[k, 7], row[k, 8] = y * tz - z * ty, z * tx - x * tz, x * ty - y * tx
+    for axis in range(3):
+        response = 0.0
+        for body, arm in ((a[k], arm_a), (b[k], arm_b)):
+            response += inverse_mass[body]
+            dx, dy, dz = row[k, 3 * axis], row[k, 3 * axis + 1], row[k, 3 * axis + 2]
+            rx, ry, rz = arm[k, 0], arm[k, 1], arm[k, 2]
+            cx, cy, cz = ry * dz - rz * dy, rz * dx - rx * dz, rx * dy - ry * dx
+            for i in range(3):
+                c = cx if i == 0 else (cy if i == 1 else cz)
+                response += c * (
+                    inverse_inertia[body, i, 0] * cx
+                    + inverse_inertia[body, i, 1] * cy
+                    + inverse_inertia[body, i, 2] * cz
+                )
+        row[k, 9 + axis] = 1.0 / response if response > 0.0 else 0.0
 
 
 @device

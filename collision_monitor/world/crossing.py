@@ -23,6 +23,15 @@ PERIOD = 8.0
 LANE_SPACING = 4.0
 """Distance (m) along y between two lanes, so large that objects of different lanes never meet."""
 
+ROD = (2.0, 0.05, 0.05)
+"""Size (m) of the rods that turn."""
+BALL = 0.15
+"""Radius (m) of the balls beside them."""
+BALL_AT = (0.8, 1.5)
+"""Distance (m) and angle (rad) of the ball that a rod meets."""
+BEYOND_ROD = hypot(ROD[0] / 2, ROD[1] / 2) + BALL + 0.01
+"""Distance (m) of the other ball: 1 cm beyond the reach of the rod's corners."""
+
 Vector = tuple[float, float, float]
 
 
@@ -79,10 +88,7 @@ def _rod_and_ball(reach: float, ball: float, angle: float, turn_rate: float) -> 
 
 
 def _lanes() -> list[tuple[_LaneObject, _LaneObject, tuple[float | None, float | None], str]]:
-    rod, thick = 2.0, 0.05
-    ball_angle, ball_distance, ball_radius = 1.5, 0.8, 0.15
-    ball_at = (ball_distance * cos(ball_angle), ball_distance * sin(ball_angle), 0.0)
-    far_ball = hypot(rod / 2, thick / 2) + ball_radius + 0.01  # 1 cm beyond the reach of the rod's corners
+    distance, angle = BALL_AT
     return [
         (
             _LaneObject("head_on_left", Sphere(0.3), (-3.0, 0.0, 0.0), (1.0, 0.0, 0.0)),
@@ -109,9 +115,9 @@ def _lanes() -> list[tuple[_LaneObject, _LaneObject, tuple[float | None, float |
             "a vertical edge ahead: 4 m less half a diagonal 0.3 sqrt(2) and half an extent 0.5, at 1 m/s",
         ),
         (
-            _LaneObject("spinning_rod", Box((rod, thick, thick)), (0.0, 0.0, 0.0), yaw_rate=0.5),
-            _LaneObject("ball", Sphere(ball_radius), ball_at),
-            _rod_and_ball(thick / 2 + ball_radius, ball_distance, ball_angle, 0.5),
+            _LaneObject("spinning_rod", Box(ROD), (0.0, 0.0, 0.0), yaw_rate=0.5),
+            _LaneObject("ball", Sphere(BALL), (distance * cos(angle), distance * sin(angle), 0.0)),
+            _rod_and_ball(ROD[1] / 2 + BALL, distance, angle, 0.5),
             "the rod's side sweeps into the ball: 0.8 sin(1.5 - 0.5 t) = 0.025 + 0.15",
         ),
         (
@@ -133,8 +139,8 @@ def _lanes() -> list[tuple[_LaneObject, _LaneObject, tuple[float | None, float |
             "passes 1 cm clear: the lines are 0.61 m apart, the radii add up to 0.6 m",
         ),
         (
-            _LaneObject("short_rod", Box((rod, thick, thick)), (0.0, 0.0, 0.0), yaw_rate=0.8),
-            _LaneObject("ball_out_of_reach", Sphere(ball_radius), (0.0, far_ball, 0.0)),
+            _LaneObject("short_rod", Box(ROD), (0.0, 0.0, 0.0), yaw_rate=0.8),
+            _LaneObject("ball_out_of_reach", Sphere(BALL), (0.0, BEYOND_ROD, 0.0)),
             (None, None),
             "the rod's corners pass 1 cm short of the ball",
         ),

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from collision_monitor.broad_phase.dense_grid import box_pairs
+from collision_monitor.broad_phase.box_pairs import box_pairs
 from collision_monitor.errors import InputError
 
 Array = NDArray[np.float64]

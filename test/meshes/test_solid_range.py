@@ -6,12 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from collision_monitor.meshes.distance.point_range import point_range
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 from collision_monitor._jit import kernel
 from collision_monitor.impact.body_impact import make_scratch
-from collision_monitor.meshes.distance.point_range import point_range
 from collision_monitor.meshes.distance.solid import SolidMemory, solid_contact
 from collision_monitor.meshes.distance.solid_range import solid_range
 from collision_monitor.meshes.trees.shape_trees import made_tree

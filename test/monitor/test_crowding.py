@@ -7,7 +7,7 @@ import pytest
 
 from collision_monitor import Box, Monitor, Pose, Sphere
 from collision_monitor.errors import Refusal
-from collision_monitor.monitor import crowding, monitor
+from collision_monitor.monitor import crowding
 
 CROWD = range(100, 160)
 PAIR = (1, 2)
@@ -16,7 +16,6 @@ PAIR = (1, 2)
 @pytest.fixture(autouse=True)
 def bound(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(crowding, "MOST_PAIRS", 500)
-    monkeypatch.setattr(monitor, "MOST_PAIRS", 500)
 
 
 def scene() -> Monitor:
@@ -90,9 +89,10 @@ def test_the_same_states_give_the_same_answers_from_a_snapshot():
     it.step(0, IDS, poses(TOGETHER))
     again = Monitor.restored("exact", it.snapshot())
     for step, at in enumerate((TOGETHER, APART, TOGETHER, APART), start=1):
-        assert it.step(step * 10**7, IDS, poses(at)).contacts.tobytes() == again.step(
-            step * 10**7, IDS, poses(at)
-        ).contacts.tobytes()
+        assert (
+            it.step(step * 10**7, IDS, poses(at)).contacts.tobytes()
+            == again.step(step * 10**7, IDS, poses(at)).contacts.tobytes()
+        )
     assert it.digest == again.digest
 
 

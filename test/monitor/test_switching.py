@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from started_threads import StartedThreads
 
 from collision_monitor import records
 from collision_monitor.accuracy.reference_monitor import ReferenceMonitor, disagreements
@@ -83,7 +84,7 @@ def test_contacts_persist_and_keep_their_age(profile: str | Profile) -> None:
 
 
 @pytest.mark.parametrize("setting", Profile.fields(), ids=lambda setting: setting.name)
-def test_every_setting_can_change_and_holds_from_then_on(setting: Any) -> None:
+def test_every_setting_can_change_and_holds_from_then_on(setting: Any, started_threads: StartedThreads) -> None:
     """Compare with plain recomputation with the new profile, at every step after the change."""
     scene = make_scene("crossing")
     monitor, plain = Monitor("balanced"), ReferenceMonitor("balanced")
@@ -106,6 +107,7 @@ def test_every_setting_can_change_and_holds_from_then_on(setting: Any) -> None:
         scene.step(0.05)
     assert reported > 50
     assert monitor.profile == changed
+    assert started_threads.most == (2 if setting.name == "threads" else 0)
 
 
 def test_predictions_are_as_exact_as_the_new_profile() -> None:

@@ -119,7 +119,7 @@ def test_the_plane_answers_as_tall_prisms_in_space_do():
         a, b = pairs(mine.predictions), pairs(theirs.predictions)
         assert a.keys() == b.keys()
         for pair, row in a.items():
-            seen += 1
+            seen += max(row["upper"], b[pair]["upper"]) < np.inf  # else one of the two comparisons says nothing
             assert row["lower"] <= b[pair]["upper"] and b[pair]["lower"] <= row["upper"]
     assert seen > 50
 

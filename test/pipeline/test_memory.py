@@ -15,7 +15,7 @@ from collision_monitor.codec import Removal, encode_descriptions, encode_states
 from collision_monitor.codec.cdr import REMEMBERED_STRINGS, _padded_string
 from collision_monitor.codec.parameter_event import decode_parameter_event, encode_parameter_event
 from collision_monitor.errors import MessageError, Refusal
-from collision_monitor.monitor.state import roster
+from collision_monitor.monitor.state import memory_use
 from collision_monitor.objects.description import MOST_NAME_BYTES, ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.shapes.convex_pieces import REMEMBERED_PIECES, convex_pieces
@@ -176,7 +176,7 @@ def test_meshes_leave_no_pieces() -> None:
 
 
 def test_the_memory_of_all_objects_has_a_limit(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(roster, "MOST_MEMORY", 1 << 20)
+    monkeypatch.setattr(memory_use, "MOST_MEMORY", 1 << 20)
     pipeline = Pipeline()
     made = describe(pipeline, *(ObjectDescription(i, BALL) for i in range(600)))
     most = len(made)
@@ -207,7 +207,7 @@ def test_what_an_object_is_counted_for_is_no_less_than_it_needs() -> None:
         tracemalloc.start()
         for i in range(520):  # the arrays have room for 1,024
             kept.append(make(i))
-            counted += roster.memory(kept[-1])
+            counted += memory_use.object_memory(kept[-1])
             monitor.describe(kept[-1])
         assert monitor._roster.allowed_keys is not None
         needed = tracemalloc.get_traced_memory()[0]

@@ -6,6 +6,7 @@ import trimesh
 
 import collision_monitor as cm
 from collision_monitor.response import mass_properties
+from collision_monitor.shapes.registry import KINDS
 
 SHAPES = {
     "sphere": (cm.Sphere(0.3), lambda: trimesh.creation.icosphere(5, 0.3)),
@@ -13,7 +14,22 @@ SHAPES = {
     "cylinder": (cm.Cylinder(0.3, 1.2), lambda: trimesh.creation.cylinder(0.3, 1.2, sections=400)),
     "capsule": (cm.Capsule(0.3, 1.2), lambda: trimesh.creation.capsule(1.2, 0.3, count=[400, 400])),
     "cone": (cm.Cone(0.3, 1.2), lambda: trimesh.creation.cone(0.3, 1.2, sections=400)),
+    "ellipsoid": (
+        cm.Ellipsoid((0.9, 0.5, 0.2)),
+        lambda: stretched(trimesh.creation.icosphere(5, 1.0), (0.9, 0.5, 0.2)),
+    ),
 }
+POLYHEDRA = (cm.ConvexHull, cm.Mesh)
+
+
+def stretched(mesh, factors):
+    mesh.apply_transform(np.diag((*factors, 1.0)))
+    return mesh
+
+
+def test_every_kind_with_a_mass_is_compared():
+    compared = {type(shape) for shape, _ in SHAPES.values()} | set(POLYHEDRA)
+    assert {kind.shape for kind in KINDS if kind.mass is not None} == compared
 
 
 @pytest.mark.parametrize("name", SHAPES)

@@ -8,6 +8,7 @@ from statistics import NormalDist
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from started_threads import threads_start
 
 import collision_monitor as cm
 from collision_monitor.errors import InputError, Refusal
@@ -212,9 +213,11 @@ def test_the_answers_are_the_same_bytes_on_two_threads_and_when_replayed() -> No
         for object_id in range(30):
             monitor.add(object_id, cm.Box((0.5, 0.4, 0.3)) if object_id % 2 else cm.Capsule(0.1, 0.5))
         rows = np.concatenate([state(k, rng.uniform(0, 4, 3), rng.normal(0, 1, 3), 0.05, 0.1) for k in range(30)])
-        for step in range(5):
-            reported = monitor.step(step * SECOND // 20, rows).predictions
-            rows["position"] += 0.05 * rows["linear"]
+        with threads_start() as started:
+            for step in range(5):
+                reported = monitor.step(step * SECOND // 20, rows).predictions
+                rows["position"] += 0.05 * rows["linear"]
+        assert started.most == (threads if threads > 1 else 0)
         digests.append(monitor.digest)
     assert len(reported) > 10
     assert len(set(digests)) == 1

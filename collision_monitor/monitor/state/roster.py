@@ -5,7 +5,7 @@ from __future__ import annotations
 import weakref
 from collections.abc import Hashable
 from itertools import chain
-from typing import Any, Final
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +18,7 @@ from collision_monitor.impact.impact_record import pair_keys
 from collision_monitor.meshes.trees.shape_trees import shape_tree
 from collision_monitor.meshes.trees.slot_trees import plant_trees
 from collision_monitor.monitor.contacts.mesh_faces import MeshFaces, faces_of
+from collision_monitor.monitor.state.memory_use import MemoryUse
 from collision_monitor.monitor.state.mesh_snapshot import mesh_arrays, plant_meshes
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage, check_range
 from collision_monitor.motion.bodies import DERIVED, BodyTable, Multibody, Parts, enlarge, make_bodies, make_parts
@@ -28,38 +29,12 @@ from collision_monitor.records import Model, ShapeType
 from collision_monitor.settings.by_name import Classes, value_of
 from collision_monitor.shapes.kinds.polygon import POLYGON
 from collision_monitor.shapes.planar import flat_pose, is_planar
+from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import HalfSpace, Mesh, Points
-from collision_monitor.shapes.shape import array_bytes
 from collision_monitor.shapes.shape_table import SHARED, TREE, ShapeTable, ShapeTableBuilder
 
 FIRST_CAPACITY = 64
 """Initial number of body slots; it is doubled when all are used."""
-
-MOST_MEMORY: Final = 512 << 20
-"""Memory that all described objects may need together (bytes, as `memory` estimates it): 160,000 objects of one shape,
-or hulls of 5,000,000 points. Descriptions beyond it are refused, because else a publisher could fill the machine."""
-
-OBJECT_BYTES: Final = 2600
-SHAPE_BYTES: Final = 700
-ALLOWED_BYTES: Final = 150
-"""Memory of an object, of each of its shapes without their arrays, and of each id in `allowed` (measured)."""
-
-COPIES: Final = 4
-"""How often the arrays of a shape are kept: in the description, in the table of shapes and in the key of its block; and
-the table has up to twice the room that it needs."""
-
-
-TREE_BYTES: Final = 330
-"""Memory of a triangle or a point in its tree: 150 to 220 bytes, and the array of all trees may have half as much room
-again. A face of a convex mesh takes 104 bytes, twice that while the faces are packed, and its hull may have a tree."""
-
-
-def memory(d: ObjectDescription) -> int:
-    """Return the memory that a described object needs (bytes), rounded up."""
-    shapes = sum(SHAPE_BYTES + COPIES * array_bytes(shape) for shape, _ in d.shapes)
-    leaves = sum(len(shape.faces) for shape, _ in d.shapes if isinstance(shape, Mesh))
-    leaves += sum(len(shape.points) for shape, _ in d.shapes if isinstance(shape, Points))
-    return OBJECT_BYTES + shapes + TREE_BYTES * leaves + ALLOWED_BYTES * len(d.allowed)
 
 
 class Roster(Stage):
@@ -74,7 +49,7 @@ class Roster(Stage):
         *("bodies", "parts", "top", "planar", "renewed"),
         *("mesh_faces", "_shapes", "_slots", "_names", "_memory", "_free", "_allowed"),
     )
-    CACHES = ("_last_ids", "_last_slots", "_allowed_keys", "_all_memory", "_by_name")
+    CACHES = ("_last_ids", "_last_slots", "_allowed_keys", "_by_name")
 
     def __init__(self) -> None:
         self.bodies: BodyTable = make_bodies(FIRST_CAPACITY)
@@ -87,8 +62,7 @@ class Roster(Stage):
         self._shapes = ShapeTableBuilder()
         self._slots: dict[int, int] = {}
         self._names: dict[int, str] = {}
-        self._memory: dict[int, int] = {}
-        self._all_memory = 0
+        self._memory = MemoryUse()
         self._free: list[int] = []
         self._allowed: dict[int, frozenset[int]] = {}
         self._allowed_keys: NDArray[np.uint64] | None = None  # None after a change
@@ -187,6 +161,11 @@ class Roster(Stage):
         is_stale = bodies.seen[used] & ~bodies.static[used] & (now - bodies.time[used] > stale_after)
         return sorted(bodies.id[used[is_stale]].tolist())
 
+    def unseen_ids(self) -> list[int]:
+        """Ids of the moving objects without any state, ascending."""
+        bodies, used = self.bodies, self.used()
+        return sorted(bodies.id[used[~bodies.seen[used] & ~bodies.static[used]]].tolist())
+
     # ------------------------------------------------------------------ changing
 
     def describe(self, d: ObjectDescription, model: Model, prepared: Modelled | None = None) -> int:
@@ -196,31 +175,13 @@ class Roster(Stage):
         Raises InputError, also if all objects together would need more than MOST_MEMORY; ShapeError; UnsupportedError
         for an unsupported shape or model.
         """
-        needed = memory(d)
-        all_memory = self._all_memory - self._memory.get(d.object_id, 0) + needed
-        if all_memory > MOST_MEMORY:
-            raise InputError(
-                f"object {d.object_id}: expected all objects together to need at most {MOST_MEMORY >> 20} MiB, got "
-                f"{all_memory / (1 << 20):.1f} MiB with {len(self) + (d.object_id not in self._slots)} objects; "
-                "remove objects, or describe them by simpler shapes"
-            )
+        self._memory.check(d)
         if not d.static and any(isinstance(shape, HalfSpace) for shape, _ in d.shapes):
             raise UnsupportedError(f"object {d.object_id}: a HalfSpace has no end and can only be static")
         planar = self._is_planar(d)
         pose = flat_pose(d.pose) if planar and d.pose is not None else d.pose
         modelled = monitored_model(d.shapes, model) if prepared is None else prepared
-        corners = modelled.corners or (None,) * len(modelled.pieces)
-        slots: list[int] = []
-        try:
-            for (shape, offset), chosen in zip(modelled.pieces, corners, strict=True):
-                tree = shape_tree(shape) if isinstance(shape, Mesh | Points) else None
-                placed = flat_pose(offset) if planar else offset
-                slots.append(self._shapes.append(shape, placed, d.padding, chosen, tree))
-            plant_trees(self._shapes)
-        except Exception:
-            for slot in slots:
-                self._shapes.remove(slot)
-            raise
+        slots = self._append_shapes(modelled, d.padding, planar)
         i = self._slots.get(d.object_id)
         if i is None:
             i = self._slots[d.object_id] = self._new_body()
@@ -236,6 +197,32 @@ class Roster(Stage):
                 self.mesh_faces.add(slot, faces)
         lay_out_body(self.multibody, i, slots, modelled.shapes)
         self.planar = planar
+        self._write_body(i, d, pose, modelled)
+        self._names[d.object_id] = d.name
+        self._memory.note(d)
+        self._allow(d.object_id, frozenset(d.allowed))
+        self.renewed.add(i)
+        self._forget_ids()
+        return i
+
+    def _append_shapes(self, modelled: Modelled, padding: float, planar: bool) -> list[int]:
+        """Append the pieces of an object to the shape table, all or none. Return their slots. Raises ShapeError."""
+        corners = modelled.corners or (None,) * len(modelled.pieces)
+        slots: list[int] = []
+        try:
+            for (shape, offset), chosen in zip(modelled.pieces, corners, strict=True):
+                tree = shape_tree(shape) if isinstance(shape, Mesh | Points) else None
+                placed = flat_pose(offset) if planar else offset
+                slots.append(self._shapes.append(shape, placed, padding, chosen, tree))
+            plant_trees(self._shapes)
+        except Exception:
+            for slot in slots:
+                self._shapes.remove(slot)
+            raise
+        return slots
+
+    def _write_body(self, i: int, d: ObjectDescription, pose: Pose | None, modelled: Modelled) -> None:
+        """Write the row of a body whose shapes are laid out. A static one gets its pose; another keeps its state."""
         bodies = self.bodies
         bodies.used[i] = True
         bodies.id[i] = d.object_id
@@ -251,12 +238,6 @@ class Roster(Stage):
             bodies.seen[i] = False  # it moves from now on, and has no state yet
         bodies.static[i] = d.static
         bodies.version[i] += 1
-        self._names[d.object_id] = d.name
-        self._memory[d.object_id], self._all_memory = needed, all_memory
-        self._allow(d.object_id, frozenset(d.allowed))
-        self.renewed.add(i)
-        self._forget_ids()
-        return i
 
     def remove(self, object_id: int) -> None:
         """Remove an object. Raises InputError for an unknown id."""
@@ -266,8 +247,8 @@ class Roster(Stage):
         self.bodies.version[i] += 1
         self.renewed.discard(i)
         self._free.append(i)
-        self._all_memory -= self._memory[object_id]
-        del self._slots[object_id], self._names[object_id], self._memory[object_id]
+        self._memory.drop(object_id)
+        del self._slots[object_id], self._names[object_id]
         self._allow(object_id, frozenset())
         self._forget_ids()
 
@@ -354,7 +335,7 @@ class Roster(Stage):
         )
         facts |= {
             "names": {str(object_id): name for object_id, name in self._names.items()},
-            "memory": {str(object_id): size for object_id, size in self._memory.items()},
+            "memory": self._memory.facts(),
             "allowed": {str(object_id): sorted(others) for object_id, others in self._allowed.items()},
             "planar": self.planar,
             "renewed": sorted(self.renewed),
@@ -381,9 +362,7 @@ class Roster(Stage):
         note_plain(self.multibody, used)
         self._slots = dict(zip(bodies.id[used].tolist(), used.tolist(), strict=True))
         self._names = {object_id: facts["names"][str(object_id)] for object_id in self._slots}
-        sizes = facts.get("memory", {})  # older sessions have none
-        self._memory = {object_id: int(sizes.get(str(object_id), OBJECT_BYTES)) for object_id in self._slots}
-        self._all_memory = sum(self._memory.values())
+        self._memory.restore(facts.get("memory", {}), self._slots)
         for object_id, others in facts["allowed"].items():
             self._allow(int(object_id), frozenset(others))
         self.planar = facts["planar"]

@@ -10,7 +10,7 @@ import json
 import math
 import zipfile
 from abc import ABC, abstractmethod
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from io import BytesIO
 from typing import Any, ClassVar, Final, NamedTuple
@@ -21,6 +21,9 @@ from numpy.typing import NDArray
 from collision_monitor.errors import InputError
 
 _FACTS: Final = "facts"
+
+_STAGES: Final = "monitor"
+"""Key of the entry of the monitor's stages in `Snapshot.facts`."""
 
 LARGEST: Final = 128 << 20
 """Unpacked bytes of a snapshot that is read. One of 10,000 objects has 9 MB."""
@@ -139,3 +142,22 @@ class Stage(ABC):
     @abstractmethod
     def restore(self, snapshot: Snapshot, facts: Facts) -> None:
         """Restore what `save` wrote. Raises InputError, KeyError, TypeError, ValueError for other content."""
+
+
+def save_stages(stages: Iterable[Stage]) -> Snapshot:
+    """Save each stage in one snapshot."""
+    snapshot = Snapshot({}, {_STAGES: {}})
+    for stage in stages:
+        stage.save(snapshot, snapshot.facts[_STAGES])
+    return snapshot
+
+
+def restore_stages(stages: Iterable[Stage], snapshot: Snapshot) -> None:
+    """Restore each stage from the snapshot. Raises InputError if it is damaged, or of stages that save other state."""
+    try:
+        for stage in stages:
+            stage.restore(snapshot, snapshot.facts[_STAGES])
+    except InputError:
+        raise
+    except (KeyError, TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise InputError(f"snapshot: expected the state of a monitor of this version, got: {error!r}") from None

@@ -59,6 +59,11 @@ class Timeline(Stage):
         """The latest time (s after the origin)."""
         return self.seconds(self.now_ns)
 
+    def age(self, now_ns: int | None, most: float) -> float:
+        """Age (s) of the latest states at `now_ns`; 0 if it is not known, or the age would not be from 0 to `most`."""
+        age = (now_ns - self.now_ns) * NANOSECOND if now_ns is not None else 0.0
+        return age if 0.0 <= age <= most else 0.0
+
     @property
     def has_begun(self) -> bool:
         """Whether there is a latest time."""

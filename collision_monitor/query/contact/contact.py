@@ -121,7 +121,8 @@ class Contact:
         """Return the distance with its error and the features that are nearest, for a person."""
         from collision_monitor.query.contact.contact_text import contact_text
 
-        return contact_text(self)
+        points = self.point_a, self.point_b
+        return contact_text(self.arguments, points, self.normal, self.signed_distance, self.error_bound)
 
     @property
     def overlaps(self) -> bool:

@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.contact_features import FeatureType
+from collision_monitor.geometry.coordinates import Array
+from collision_monitor.query.arguments import Compound
 from collision_monitor.query.contact.features import feature_of, shape_tie
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Box, ConvexHull, Mesh, Points, Shape
 
-if TYPE_CHECKING:
-    from collision_monitor.geometry.coordinates import Array
-    from collision_monitor.query.arguments import Compound
-    from collision_monitor.query.contact.contact import Contact
 
-
-def contact_text(contact: Contact) -> str:
-    """Text such as `Contact(0.0123 m ± 1e-12, box face 3 – capsule surface)`."""
-    shape_a, pose_a, shape_b, pose_b = contact.arguments
-    tie, off = shape_tie(shape_a, shape_b), contact.error_bound
-    a = _feature(shape_a, pose_a, contact.point_a, contact.normal, tie, off)
-    b = _feature(shape_b, pose_b, contact.point_b, -contact.normal, tie, off)
-    return f"Contact({contact.signed_distance:.4g} m ± {contact.error_bound:.1g}, {a} – {b})"
+def contact_text(
+    arguments: tuple[Compound, Pose, Compound, Pose],
+    points: tuple[Array, Array],
+    normal: Array,
+    distance: float,
+    error: float,
+) -> str:
+    """Text such as `Contact(0.0123 m ± 1e-12, box face 3 – capsule surface)`. The arguments are those of `Contact`."""
+    shape_a, pose_a, shape_b, pose_b = arguments
+    tie = shape_tie(shape_a, shape_b)
+    a = _feature(shape_a, pose_a, points[0], normal, tie, error)
+    b = _feature(shape_b, pose_b, points[1], -normal, tie, error)
+    return f"Contact({distance:.4g} m ± {error:.1g}, {a} – {b})"
 
 
 def _feature(shape: Compound, pose: Pose, point: Array, normal: Array, tie: float, off: float) -> str:

@@ -124,9 +124,7 @@ def contacts(
                 rows[k, column : column + 3] = value
     normal, point_a, point_b = (rows[:, column : column + 3] for column in (NORMAL, POINT_A, POINT_B))
     pairs = Pairs(a, x_a, b, x_b)
-    return Contacts(
-        rows[:, DISTANCE], rows[:, BOUND], normal, point_a, point_b, pairs, np.arange(count), is_special
-    )
+    return Contacts(rows[:, DISTANCE], rows[:, BOUND], normal, point_a, point_b, pairs, np.arange(count), is_special)
 
 
 def _pose(row: Array) -> Pose:

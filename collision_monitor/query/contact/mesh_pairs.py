@@ -88,9 +88,7 @@ def boxes_apart(shape_a: Shape, pose_a: Pose, shape_b: Shape, pose_b: Pose) -> b
     return bool(roots_apart.entry(a, x_a, b, x_b, _OWN.work))
 
 
-def mesh_contact(
-    shape_a: Any, pose_a: Any, shape_b: Any, pose_b: Any
-) -> tuple[float, float | None, Array] | None:
+def mesh_contact(shape_a: Any, pose_a: Any, shape_b: Any, pose_b: Any) -> tuple[float, float | None, Array] | None:
     """Distance of two surfaces that are apart, its bound (m), and their contact row, with points in the world.
 
     The bound is None if the inside of a mesh is not certain. The result is None for other pairs than `mesh_overlap`
@@ -142,9 +140,7 @@ def packed_trees_overlap(tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, mem
 
 @settled
 @kernel
-def trees_contact(
-    tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, memory: Any, row: Any
-) -> tuple[float, float]:
+def trees_contact(tree_a: Any, pose_a: Any, tree_b: Any, pose_b: Any, memory: Any, row: Any) -> tuple[float, float]:
     """`tree_contact` of two trees placed as in `packed_trees_overlap`, with points in the world.
 
     Return the distance and its bound (m), a bound below 0 if they are not certainly apart.

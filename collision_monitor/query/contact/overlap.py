@@ -51,9 +51,7 @@ def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, te
             return any(polygons_intersect(a, b) is not Evidence.SEPARATE for a in plane[0] for b in plane[1])
         first, second = ([polygon[part] for polygon in side for part in convex_parts(polygon)] for side in plane)
         return any(sat_2d(a, b).overlaps for a in first for b in second)
-    solids = [
-        _solids(shape, pose, test, name) for shape, pose, name in _named(shape_a, pose_a, shape_b, pose_b)
-    ]
+    solids = [_solids(shape, pose, test, name) for shape, pose, name in _named(shape_a, pose_a, shape_b, pose_b)]
     if test == "sat":
         return any(sat_3d(a, b).overlaps for a in solids[0] for b in solids[1])
     return any(polyhedra_intersect(*a, *b).collides for a in solids[0] for b in solids[1])

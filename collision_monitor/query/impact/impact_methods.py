@@ -21,13 +21,13 @@ from collision_monitor.impact.body_impact import ShapePair, contact_at, make_scr
 from collision_monitor.impact.sphere_interval import sphere_interval
 from collision_monitor.motion.bodies import Multibody, make_bodies
 from collision_monitor.query.impact.moving_pair import (
+    ITERATIONS,
     MotionQuery,
     MovingShape,
     first_impacts,
     lay_out_pair,
     make_moving_shape,
 )
-from collision_monitor.query.impact.time_of_impact import ITERATIONS
 from collision_monitor.shapes.pose import Motion, Pose, rotation_matrix
 from collision_monitor.shapes.registry import Box, HalfSpace, Shape, Sphere
 from collision_monitor.tolerances import PARALLEL_SIN2

@@ -43,6 +43,9 @@ REMEMBERED: Final = 256 << 20
 """Bytes of the trees of pairs that are remembered. Less: each query of two meshes copies them, 1 ms for
 5,000 triangles."""
 
+ITERATIONS: Final = 1000
+"""Default limit of distance queries for one pair of pieces; hardly any pair needs more than 20."""
+
 
 class MotionQuery(NamedTuple):
     """Parameters of the search for the first time at which two moving shapes are within the separation."""

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Final, Literal
+from typing import Any
 
 import numpy as np
 
@@ -17,8 +16,15 @@ from collision_monitor.query.arguments import Compound, finite_number, whole_num
 from collision_monitor.query.contact.contact import Contact, contact
 from collision_monitor.query.contact.fillings import fillings
 from collision_monitor.query.contact.open_gap import least_gap
+from collision_monitor.query.impact.impact import (
+    CLEAR_IMPACT,
+    Impact,
+    impact_of_times,
+    timed_impact,
+)
 from collision_monitor.query.impact.initial_contact_impact import follow
 from collision_monitor.query.impact.moving_pair import (
+    ITERATIONS,
     MotionQuery,
     MovingShape,
     deep_overlap_time,
@@ -31,52 +37,8 @@ from collision_monitor.query.impact.single_kernel_impact import quick_open_impac
 from collision_monitor.records import Method
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
 from collision_monitor.shapes.pose import Motion
-from collision_monitor.shapes.registry import HalfSpace, Mesh, Sphere
+from collision_monitor.shapes.registry import HalfSpace, Mesh
 from collision_monitor.tolerances import GJK_TOUCHING
-
-ITERATIONS: Final = 1000
-"""Default limit of distance queries for one pair of pieces; hardly any pair needs more than 20."""
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Impact:
-    """First time at which two shapes are within the separation, in s from the given poses.
-
-    "hit": it lies within [lower, upper]. "clear": there is none within the horizon; lower and upper are infinite.
-    "unresolved": there is none before lower, but the shapes come so near that round-off or the budget leaves open
-    whether they meet, or the inside of a mesh is uncertain; upper is infinite. Treat it as a hit.
-    contact: the contact at upper, or at lower if upper is infinite; None if clear. method: what found the interval.
-
-    >>> import collision_monitor as cm
-    >>> still, aside = cm.Motion(cm.Pose()), cm.Motion(cm.Pose((0, 5, 0)), linear=(1, 0, 0))
-    >>> cm.time_of_impact(cm.Box((1, 1, 1)), still, cm.Box((1, 1, 1)), aside).status
-    'clear'
-    """
-
-    status: Literal["hit", "clear", "unresolved"]
-    lower: float
-    upper: float
-    contact: Contact | None
-    method: Method = Method.CONSERVATIVE_ADVANCEMENT
-
-    def __repr__(self) -> str:
-        """Return status and times for a person."""
-        if self.status == "clear":
-            return "Impact(clear)"
-        return f"Impact({self.status} in {self.lower:.6g} to {self.upper:.6g} s)"
-
-    def __getattr__(self, name: str) -> Any:
-        """Compute the contact when it is first read: it takes as long as the search for the time."""
-        if name != "contact" or "_arguments" not in vars(self):
-            raise AttributeError(name)
-        shape_a, motion_a, shape_b, motion_b = vars(self)["_arguments"]
-        at = self.upper if self.upper < math.inf else self.lower
-        found = contact(shape_a, motion_a.at(at), shape_b, motion_b.at(at))
-        vars(self)["contact"] = found
-        return found
-
-
-_CLEAR: Final = Impact("clear", math.inf, math.inf, None)
 
 
 def time_of_impact(
@@ -125,7 +87,7 @@ def time_of_impact(
     if all(shape.surface.certain for body in (a, b) for shape, _ in body.shapes if isinstance(shape, Mesh)):
         return found
     possible = _first_possible_impact(a, b, query) if found.lower > 0.0 else 0.0
-    return found if possible >= found.lower else _impact(possible, found.upper, found.method, arguments)
+    return found if possible >= found.lower else timed_impact(possible, found.upper, found.method, arguments)
 
 
 def _is_open(shape: Compound) -> bool:
@@ -174,10 +136,10 @@ def _first_impact(a: MovingShape, b: MovingShape, query: MotionQuery, uncertain:
         upper = deep_overlap_time(multibody, query, round_off)
         if upper <= 0.0:
             return Impact("hit", 0.0, 0.0, start)
-        return _impact(0.0, upper, Method.CONSERVATIVE_ADVANCEMENT, arguments)
+        return timed_impact(0.0, upper, Method.CONSERVATIVE_ADVANCEMENT, arguments)
     events = first_impacts(multibody, np.array([[0, 1]], np.int32), 0.0, query)
     if not len(events):
-        return _CLEAR
+        return CLEAR_IMPACT
     lower = float(events[0]["lower"])
     upper = float(events[0]["upper"]) if events[0]["status"] == HIT else math.inf
     if lower <= 0.0:
@@ -191,29 +153,9 @@ def _first_impact(a: MovingShape, b: MovingShape, query: MotionQuery, uncertain:
             lower = 0.0
         upper = min(upper, sure)
         if lower == math.inf:
-            return _CLEAR
-    return _impact(lower, upper if upper <= query.horizon else math.inf, Method(int(events[0]["method"])), arguments)
-
-
-def impact_of_times(times: tuple[float, float], arguments: tuple[Any, Any, Any, Any]) -> Impact:
-    """Impact of two convex solids or meshes that come together within these times (s); infinite: never."""
-    lower, upper = times
-    if lower == math.inf:
-        return _CLEAR
-    shape_a, motion_a, shape_b, motion_b = arguments
-    used = Method.CONSERVATIVE_ADVANCEMENT
-    are_spheres = type(shape_a) is type(shape_b) is Sphere
-    if lower > 0.0 and are_spheres and (motion_a.acceleration == motion_b.acceleration).all():
-        used = Method.CLOSED_FORM
-    return _impact(lower, upper, used, arguments)
-
-
-def _impact(lower: float, upper: float, method: Method, arguments: tuple[Any, Any, Any, Any]) -> Impact:
-    """Return an impact that computes its contact when that is read."""
-    made = object.__new__(Impact)
-    status = "hit" if upper < math.inf else "unresolved"
-    made.__dict__.update(status=status, lower=lower, upper=upper, method=method, _arguments=arguments)
-    return made
+            return CLEAR_IMPACT
+    upper = upper if upper <= query.horizon else math.inf
+    return timed_impact(lower, upper, Method(int(events[0]["method"])), arguments)
 
 
 def check_query(horizon: float, tolerance: float, separation: float, iterations: int) -> MotionQuery:

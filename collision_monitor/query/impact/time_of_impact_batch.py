@@ -14,21 +14,21 @@ from collision_monitor.impact.body_impact import ImpactQuery, make_scratch
 from collision_monitor.impact.impact_record import IMPACT
 from collision_monitor.query.arguments import Compound
 from collision_monitor.query.batch_result import BatchResult, Pairs
+from collision_monitor.query.impact.impact import Impact, impact_of_times
 from collision_monitor.query.impact.impact_rows import (
     ImpactTimes,
     impacts_of_rows,
     impacts_of_spheres,
     normalise_states,
 )
-from collision_monitor.query.impact.moving_pair import MotionQuery, MovingShape, lay_out_pair, make_moving_shape
-from collision_monitor.query.impact.time_of_impact import (
+from collision_monitor.query.impact.moving_pair import (
     ITERATIONS,
-    Impact,
-    check_bounded,
-    check_query,
-    impact_of_times,
-    time_of_impact,
+    MotionQuery,
+    MovingShape,
+    lay_out_pair,
+    make_moving_shape,
 )
+from collision_monitor.query.impact.time_of_impact import check_bounded, check_query, time_of_impact
 from collision_monitor.query.pair_arrays import PackedShapes
 from collision_monitor.shapes.planar import is_planar
 from collision_monitor.shapes.pose import Motion, Pose
@@ -177,9 +177,7 @@ def motion_of(state: Array) -> Motion:
     return Motion(Pose(state[:3], state[3:7]), state[7:10], state[10:13])
 
 
-def _solve(
-    a: MovingShape, b: MovingShape, states: tuple[Array, Array], query: MotionQuery, times: ImpactTimes
-) -> None:
+def _solve(a: MovingShape, b: MovingShape, states: tuple[Array, Array], query: MotionQuery, times: ImpactTimes) -> None:
     """Fill the times; motions that touch at the start stay undecided."""
     multibody = lay_out_pair(a, b, query.horizon)
     radii = multibody.bodies.motion["radius"]

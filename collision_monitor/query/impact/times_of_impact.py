@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from collision_monitor.query.batch_result import Pairs
 from collision_monitor.query.contact.convex_pairs import MEMORY
+from collision_monitor.query.impact.moving_pair import ITERATIONS
 from collision_monitor.query.impact.pair_impact_rows import DECIDED, pair_impact_rows
-from collision_monitor.query.impact.time_of_impact import ITERATIONS, check_query, time_of_impact
+from collision_monitor.query.impact.time_of_impact import check_query, time_of_impact
 from collision_monitor.query.impact.time_of_impact_batch import Impacts, motion_of
 from collision_monitor.query.pair_arrays import (
     Progress,

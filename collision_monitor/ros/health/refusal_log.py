@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import islice
 from typing import Final
 
 from collision_monitor.errors import Refusal
-from collision_monitor.monitor.monitor import Monitor
+from collision_monitor.pipeline.pipeline import Pipeline
 
 PERIOD: Final = 10_000_000_000
 """ns between two lines about the same problem: a flood of wrong messages must not become a flood of lines."""
@@ -28,35 +29,35 @@ class _Problem:
 class RefusalLog:
     """Warns of refused input, of restarts of the timeline and of stale objects. All times in ns of a steady clock."""
 
-    def __init__(self, monitor: Monitor, warn: Callable[[str], object]) -> None:
-        self._monitor = monitor
+    def __init__(self, pipeline: Pipeline, warn: Callable[[str], object]) -> None:
+        self._pipeline = pipeline
         self._warn = warn
-        self._refused = dict(monitor.refused)
-        self._restarts = monitor.restarts
+        self._refused = dict(pipeline.refused)
+        self._restarts = pipeline.restarts
         self._problems: dict[tuple[str, str], _Problem] = {}  # by topic and kind
 
     def report(self, topic: str, now: int) -> None:
-        """Log what the monitor refused in a message of this topic, and whether the message restarted the timeline."""
-        monitor = self._monitor
-        if monitor.restarts != self._restarts:
-            self._restarts = monitor.restarts
-            self.note(topic, "restart", monitor.refusal_texts[Refusal.TIME], 1, now)
-        if monitor.refused == self._refused:
+        """Log what was refused in a message of this topic, and whether the message restarted the timeline."""
+        pipeline = self._pipeline
+        if pipeline.restarts != self._restarts:
+            self._restarts = pipeline.restarts
+            self.note(topic, "restart", pipeline.refusal_texts[Refusal.TIME], 1, now)
+        if pipeline.refused == self._refused:
             return
-        for reason, count in monitor.refused.items():
+        for reason, count in pipeline.refused.items():
             new = count - self._refused[reason]
             if new:
-                self.note(topic, reason.value, monitor.refusal_texts[reason], new, now)
-        self._refused = dict(monitor.refused)
+                self.note(topic, reason.value, pipeline.refusal_texts[reason], new, now)
+        self._refused = dict(pipeline.refused)
 
     def report_stale(self, topic: str, now: int) -> None:
         """Log which objects are stale while others get new states."""
-        ids = self._monitor.stale_ids
-        if not ids:
+        stale = self._pipeline.stale()
+        if not stale:
             return
         problem = self._problems.setdefault((topic, "stale"), _Problem())
         problem.count = 0  # one line is about all of them, however often they were found stale
-        self.note(topic, "stale", f"no usable new state of object {named(self._monitor, ids)}: stale", 1, now)
+        self.note(topic, "stale", f"no usable new state of object {named(stale)}: stale", 1, now)
 
     def catch_up(self, now: int) -> None:
         """Log what has waited for its line. Call it regularly."""
@@ -80,10 +81,10 @@ class RefusalLog:
         self._warn(_printable(f"{topic}: {problem.text}{times}"))
 
 
-def named(monitor: Monitor, ids: Sequence[int]) -> str:
+def named(objects: Mapping[int, str]) -> str:
     """Return the first NAMED of these objects with their names, and the number of the others."""
-    more = f" and {len(ids) - NAMED} more" if len(ids) > NAMED else ""
-    return ", ".join(f"{object_id} ({monitor.name(object_id)!r})" for object_id in ids[:NAMED]) + more
+    more = f" and {len(objects) - NAMED} more" if len(objects) > NAMED else ""
+    return ", ".join(f"{object_id} ({name!r})" for object_id, name in islice(objects.items(), NAMED)) + more
 
 
 def _printable(text: str) -> str:

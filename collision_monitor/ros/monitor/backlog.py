@@ -8,8 +8,8 @@ from typing import Final
 
 import numpy as np
 
-from collision_monitor.codec import ObjectStateArray, decode_states
-from collision_monitor.errors import MessageError
+from collision_monitor.codec import ObjectStateArray
+from collision_monitor.pipeline.state_intake import ReceivedStates
 
 AT_ONCE: Final = 2_000_000
 """ns: states that follow a step within this time were waiting for its end."""
@@ -19,7 +19,6 @@ RECOVERY: Final = 2.0
 
 LEARNING: Final = 0.2
 """Weight of the last step in the mean duration."""
-
 
 OUTLIER: Final = 4.0
 """A step counts as at most so many mean steps: a single slow one does not mean that the next ones are slow."""
@@ -38,13 +37,13 @@ class Backlog:
         self._ended = 0  # ns, of the last step
         self.mean = 0.0  # duration of a step, s
 
-    def choose(self, data: bytes) -> list[bytes]:
-        """Return the messages to process now, in order: `data`, which has arrived, and those behind it."""
+    def choose(self, first: ReceivedStates) -> list[ReceivedStates]:
+        """Return the messages to process now, in order: `first`, which has arrived, and those behind it."""
         if monotonic_ns() - self._ended > AT_ONCE:
-            return [data]
-        waiting = [data]
+            return [first]
+        waiting = [first]
         while len(waiting) < self._most and (each := self._take()) is not None:
-            waiting.append(each)
+            waiting.append(ReceivedStates.decode(each))
         chosen = without_outdated(waiting, self.mean)
         self.outdated += len(waiting) - len(chosen)
         return chosen
@@ -56,24 +55,17 @@ class Backlog:
         self.mean += LEARNING * (min(took, OUTLIER * self.mean) - self.mean) if self.mean else took
 
 
-def without_outdated(waiting: Sequence[bytes], step_s: float) -> list[bytes]:
+def without_outdated(waiting: Sequence[ReceivedStates], step_s: float) -> list[ReceivedStates]:
     """Return the messages without those whose objects all have newer states behind them.
 
     All of them stay if they can be worked off soon, at step_s (s) for each. Messages that cannot be decoded stay, so
     that they are refused and counted.
     """
-    messages = [_decoded(each) for each in waiting]
+    messages = [each.message for each in waiting]
     stamps = [each.stamp_ns for each in messages if each is not None]
     if len(stamps) < 2 or RECOVERY * step_s * len(waiting) * 1e9 <= max(stamps) - min(stamps):
         return list(waiting)
-    return [data for k, data in enumerate(waiting) if not _is_outdated(messages[k], messages[k + 1 :])]
-
-
-def _decoded(data: bytes) -> ObjectStateArray | None:
-    try:
-        return decode_states(data)
-    except MessageError:
-        return None
+    return [each for k, each in enumerate(waiting) if not _is_outdated(messages[k], messages[k + 1 :])]
 
 
 def _is_outdated(message: ObjectStateArray | None, later: Sequence[ObjectStateArray | None]) -> bool:

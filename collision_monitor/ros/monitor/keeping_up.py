@@ -8,6 +8,7 @@ from typing import Final
 
 from rclpy.subscription import Subscription
 
+from collision_monitor.pipeline.state_intake import ReceivedStates
 from collision_monitor.ros.endpoints import take_waiting
 from collision_monitor.ros.health.refusal_log import RefusalLog
 from collision_monitor.ros.health.step_times import StepTimes
@@ -60,12 +61,12 @@ class KeepingUp:
         """Least period (s) of the steps that the node can keep."""
         return ROOM * self._backlog.mean if self._enabled else 0.0
 
-    def choose(self, data: bytes) -> list[bytes]:
-        """Return the messages to process now: `data`, which has arrived, and others that wait."""
+    def choose(self, first: ReceivedStates) -> list[ReceivedStates]:
+        """Return the messages to process now: `first`, which has arrived, and others that wait."""
         if not self._enabled:
-            return [data]
+            return [first]
         before = self._backlog.outdated
-        chosen = self._backlog.choose(data)
+        chosen = self._backlog.choose(first)
         if count := self._backlog.outdated - before:
             text = "steps take longer than the period of the states: outdated ones are left out"
             self._log.note(self._topic, "outdated", text, count, monotonic_ns())

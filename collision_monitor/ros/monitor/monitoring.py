@@ -9,6 +9,7 @@ from __future__ import annotations
 import gc
 import time
 from contextlib import ExitStack
+from functools import partial
 from typing import TYPE_CHECKING, Final
 
 from rclpy.clock import Clock
@@ -20,6 +21,7 @@ from collision_monitor.alerts.rules import Rules
 from collision_monitor.pipeline.pipeline import Outputs, Pipeline
 from collision_monitor.pipeline.preparation import Preparation
 from collision_monitor.pipeline.shape_intake import TakenShapes
+from collision_monitor.pipeline.state_intake import ReceivedStates
 from collision_monitor.pipeline.topics import STATUS_PERIOD, Topic
 from collision_monitor.records import Phase
 from collision_monitor.ros.endpoints import answer_publisher, subscription
@@ -101,7 +103,7 @@ class Monitoring:
         shapes = subscription(node, Topic.SHAPES, self._on_shapes)
         states = subscription(node, Topic.STATES, self._on_states)
         self._shapes_in, self._states_in = shapes.topic_name, states.topic_name
-        self._refusals = RefusalLog(self._pipeline.monitor, self._logger.warning)
+        self._refusals = RefusalLog(self._pipeline, self._logger.warning)
         readable = self._contacts_out, self._markers_out
         self._readers = ContactReaders(readable, self._recording, self._pipeline)
         self._keeping_up = KeepingUp(states, self._times, self._refusals, profile, enabled=settings.keep_up)
@@ -145,7 +147,10 @@ class Monitoring:
         from collision_monitor.ros.monitor.live_sources import LiveSources
 
         def take(given: Input) -> None:
-            (self._take_step if given.topic is Topic.STATES else self._on_shapes)(given.data)
+            if given.topic is Topic.STATES:
+                self._take_step(ReceivedStates.decode(given.data))
+            else:
+                self._on_shapes(given.data)
 
         def warn(name: str, text: str, count: int) -> None:
             self._refusals.note("sources", name, text, count, time.monotonic_ns())
@@ -156,19 +161,20 @@ class Monitoring:
 
     def _on_states(self, data: bytes) -> None:
         """Take a step for each message that waits, without those that are outdated."""
-        for each in self._keeping_up.choose(data):
+        for each in self._keeping_up.choose(ReceivedStates.decode(data)):
             self._take_step(each)
 
-    def _take_step(self, data: bytes) -> None:
+    def _take_step(self, states: ReceivedStates) -> None:
         """Publish the answers, then record them. Publish status and markers and record a snapshot if they are due."""
         began, received = time.monotonic_ns(), self._now()
         if self._readers.look():
             self._use(self._chosen)
-        outputs = self._answer(data, received)
+        due = received + self._keeping_up.mean_step
+        outputs = self._pipeline.take_states(states, due, partial(self._publish_answers, states))
         ended = time.monotonic_ns()
         self._refusals.report(self._states_in, ended)
         if outputs is None:
-            self._recording.write(Topic.STATES, data, received, received)
+            self._recording.write(Topic.STATES, states.data, received, received)
             return
         if outputs.result.stamp_ns != self._last_stamp:  # a stamp that stands still is no news, however often it comes
             self._last_step, self._last_stamp = ended, outputs.result.stamp_ns
@@ -177,24 +183,20 @@ class Monitoring:
         if self._sources is not None:
             self._sources.set_pace(self._keeping_up.pace)
         self._peaks.add(outputs.result.status)
-        self._record_step(data, outputs, received)
+        self._record_step(states.data, outputs, received)
         self._publish_status_if_due(ended)
-        self._publish_markers_if_due(data, outputs, ended)
+        self._publish_markers_if_due(states, outputs, ended)
         self._recording.write_snapshot_if_due(self._pipeline.snapshot)
         if ended - self._last_watchdog >= LATE_WATCHDOG:
             self._on_watchdog()
 
-    def _answer(self, states: bytes, received: int) -> Outputs | None:
-        """Take one step and publish its answers, all within the step's budget."""
-        with self._pipeline.monitor.clock:
-            outputs = self._pipeline.on_states(states, received + self._keeping_up.mean_step)
-            if outputs is not None:
-                self._predictions_out.publish(outputs.predictions)  # first: a warning is worth more if it is early
-                if self._readers.found or not self._readers.are_there:  # no first message without details
-                    self._contacts_out.publish(outputs.contacts)
-                self._monitored.move(states)  # before the alerts, which a guard compares with them
-                self._publish_alerts(outputs.alerts)
-            return outputs
+    def _publish_answers(self, states: ReceivedStates, outputs: Outputs) -> None:
+        """Publish the answers of a step, within its budget."""
+        self._predictions_out.publish(outputs.predictions)  # first: a warning is worth more if it is early
+        if self._readers.found or not self._readers.are_there:  # no first message without details
+            self._contacts_out.publish(outputs.contacts)
+        self._monitored.move(states.data)  # before the alerts, which a guard compares with them
+        self._publish_alerts(outputs.alerts)
 
     def _publish_alerts(self, alerts: tuple[bytes, ...]) -> None:
         for each in alerts:
@@ -215,13 +217,14 @@ class Monitoring:
         for each in outputs.alerts:
             self._recording.write(Topic.ALERTS, each, received, stamp)
 
-    def _publish_markers_if_due(self, states: bytes, outputs: Outputs, now: int) -> None:
+    def _publish_markers_if_due(self, states: ReceivedStates, outputs: Outputs, now: int) -> None:
+        assert states.message is not None, "it was answered"
         if now - self._last_markers < MARKER_PERIOD or not self.is_active:
             return
         if not self._markers_out.get_subscription_count():
             return
         self._last_markers = now
-        self._markers_out.publish(self._markers.draw(codec.decode_states(states).states, outputs.result))
+        self._markers_out.publish(self._markers.draw(states.message.states, outputs.result))
 
     # -- shapes and settings
 
@@ -274,7 +277,7 @@ class Monitoring:
 
     def _check_rules(self) -> None:
         """Warn if a rule asks for more than the predictions tell."""
-        horizon, longest = self._pipeline.monitor.profile.horizon, self._pipeline.rules.longest_time
+        horizon, longest = self._pipeline.profile.horizon, self._pipeline.rules.longest_time
         if longest > horizon:
             self._logger.warning(
                 f"a rule has a threshold of {longest:g} s, and collisions are predicted only {horizon:g} s ahead: "
@@ -321,7 +324,7 @@ class Monitoring:
 
     def _is_silent(self, now: int) -> bool:
         """Return whether newer states once arrived and no longer arrive, by the steady clock."""
-        return self._last_step is not None and now - self._last_step >= self._pipeline.monitor.profile.stale_after * 1e9
+        return self._last_step is not None and now - self._last_step >= self._pipeline.profile.stale_after * 1e9
 
     def _log_silence(self, silent: bool) -> None:
         self._was_silent = silent
@@ -348,15 +351,15 @@ class Monitoring:
 
     def facts(self) -> NodeFacts:
         """Return what the diagnostics report on. The peaks are those since the last call."""
-        now, monitor = time.monotonic_ns(), self._pipeline.monitor
+        now, pipeline = time.monotonic_ns(), self._pipeline
         deferred, unresolved = self._peaks.take()
         return NodeFacts(
             status=codec.decode_status(self._status(now)),
             topic=self._states_in,
             silence=None if self._last_step is None else (now - self._last_step) * 1e-9,
-            stale_after=monitor.profile.stale_after,
-            stale=named(monitor, monitor.stale_ids),
-            unseen=named(monitor, monitor.unseen_ids),
+            stale_after=pipeline.profile.stale_after,
+            stale=named(pipeline.stale()),
+            unseen=named(pipeline.unseen()),
             deferred=deferred,
             unresolved=unresolved,
             outdated=self._keeping_up.outdated,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any, Final
 
-from collision_monitor._jit import kernel
+from collision_monitor._jit import device, kernel
 
 MOST_CORNERS: Final = 8
 """Most corners of a face clipped by a rectangle."""
@@ -33,15 +33,7 @@ def face_contacts(
     """
     for k in range(len(pairs)):
         count[k] = 0
-        face, side, best = -1, 0, FACE_ON
-        for s in range(2):
-            body = pairs[k, s]
-            for axis in range(3):
-                cosine = 0.0
-                for c in range(3):
-                    cosine += rotation[body, c, axis] * normal[k, c]
-                if abs(cosine) > best + (TIE if s == 1 else 0.0):
-                    best, face, side = abs(cosine), axis, s
+        face, side = _reference_face(rotation, pairs[k], normal[k])
         if face < 0:
             continue
         ref, other = pairs[k, side], pairs[k, 1 - side]
@@ -51,53 +43,9 @@ def face_contacts(
         for c in range(3):
             along += rotation[ref, c, face] * normal[k, c]
         sign = toward if along > 0.0 else -toward
+        _lay_opposite_face(half, position, rotation, ref, other, face, sign, scratch[0])
+        size, source = _clip(half[ref], face, scratch)
         u, v = (face + 1) % 3, (face + 2) % 3
-        # the face of the other box that looks most against it
-        back, against = 0, 0.0
-        for axis in range(3):
-            cosine = 0.0
-            for c in range(3):
-                cosine += rotation[other, c, axis] * rotation[ref, c, face]
-            if abs(cosine) > abs(against):
-                back, against = axis, cosine
-        up = -1.0 if against * sign > 0.0 else 1.0
-        p, q = (back + 1) % 3, (back + 2) % 3
-        for corner in range(4):
-            x = half[other, p] if corner == 0 or corner == 3 else -half[other, p]
-            y = half[other, q] if corner < 2 else -half[other, q]
-            for row in range(3):  # along u, along v, height over the reference face
-                axis = u if row == 0 else (v if row == 1 else face)
-                total = 0.0
-                for c in range(3):
-                    at = (
-                        position[other, c] - position[ref, c]
-                        + up * half[other, back] * rotation[other, c, back]
-                        + x * rotation[other, c, p] + y * rotation[other, c, q]
-                    )  # fmt: skip
-                    total += at * rotation[ref, c, axis]
-                scratch[0, corner, row] = total if row < 2 else sign * total - half[ref, face]
-        size, source = 4, 0
-        edge_on = TIE * (half[ref, u] + half[ref, v])
-        for edge in range(4):
-            row, limit = edge // 2, half[ref, u] if edge < 2 else half[ref, v]
-            way = 1.0 if edge % 2 == 0 else -1.0
-            kept = 0
-            for m in range(size):
-                n = (m + 1) % size
-                here, there = limit - way * scratch[source, m, row], limit - way * scratch[source, n, row]
-                if here >= -edge_on and kept < MOST_CORNERS:
-                    for c in range(3):
-                        scratch[1 - source, kept, c] = scratch[source, m, c]
-                    kept += 1
-                crosses = min(here, there) < -edge_on and max(here, there) > edge_on
-                if crosses and kept < MOST_CORNERS:
-                    part = here / (here - there)
-                    for c in range(3):
-                        scratch[1 - source, kept, c] = scratch[source, m, c] + part * (
-                            scratch[source, n, c] - scratch[source, m, c]
-                        )
-                    kept += 1
-            size, source = kept, 1 - source
         for c in range(3):
             normal[k, c] = toward * sign * rotation[ref, c, face]
         for m in range(size):
@@ -113,3 +61,81 @@ def face_contacts(
                         + sign * (half[ref, face] + 0.5 * height) * rotation[ref, c, face]
                     )
                 count[k] = i + 1
+
+
+@device
+def _reference_face(rotation: Any, pair: Any, normal: Any) -> Any:
+    """The axis of the face that looks most along the normal, and the side of its box; (-1, 0) if none does."""
+    face, side, best = -1, 0, FACE_ON
+    for s in range(2):
+        body = pair[s]
+        for axis in range(3):
+            cosine = 0.0
+            for c in range(3):
+                cosine += rotation[body, c, axis] * normal[c]
+            if abs(cosine) > best + (TIE if s == 1 else 0.0):
+                best, face, side = abs(cosine), axis, s
+    return face, side
+
+
+@device
+def _lay_opposite_face(
+    half: Any, position: Any, rotation: Any, ref: int, other: int, face: int, sign: float, corners: Any
+) -> None:
+    """Write the corners (4, 3) in m of the face of the other box that looks most against the reference face.
+
+    Along the two axes of the reference face, and its height over that.
+    """
+    u, v = (face + 1) % 3, (face + 2) % 3
+    back, against = 0, 0.0
+    for axis in range(3):
+        cosine = 0.0
+        for c in range(3):
+            cosine += rotation[other, c, axis] * rotation[ref, c, face]
+        if abs(cosine) > abs(against):
+            back, against = axis, cosine
+    up = -1.0 if against * sign > 0.0 else 1.0
+    p, q = (back + 1) % 3, (back + 2) % 3
+    for corner in range(4):
+        x = half[other, p] if corner == 0 or corner == 3 else -half[other, p]
+        y = half[other, q] if corner < 2 else -half[other, q]
+        for row in range(3):
+            axis = u if row == 0 else (v if row == 1 else face)
+            total = 0.0
+            for c in range(3):
+                at = (
+                    position[other, c] - position[ref, c]
+                    + up * half[other, back] * rotation[other, c, back]
+                    + x * rotation[other, c, p] + y * rotation[other, c, q]
+                )  # fmt: skip
+                total += at * rotation[ref, c, axis]
+            corners[corner, row] = total if row < 2 else sign * total - half[ref, face]
+
+
+@device
+def _clip(half: Any, face: int, scratch: Any) -> Any:
+    """Clip the corners in scratch[0] by the four edges of a face. Return how many are left, and where in scratch."""
+    u, v = (face + 1) % 3, (face + 2) % 3
+    size, source = 4, 0
+    edge_on = TIE * (half[u] + half[v])
+    for edge in range(4):
+        row, limit = edge // 2, half[u] if edge < 2 else half[v]
+        way = 1.0 if edge % 2 == 0 else -1.0
+        kept = 0
+        for m in range(size):
+            n = (m + 1) % size
+            here, there = limit - way * scratch[source, m, row], limit - way * scratch[source, n, row]
+            if here >= -edge_on and kept < MOST_CORNERS:
+                for c in range(3):
+                    scratch[1 - source, kept, c] = scratch[source, m, c]
+                kept += 1
+            crosses = min(here, there) < -edge_on and max(here, there) > edge_on
+            if crosses and kept < MOST_CORNERS:
+                part = here / (here - there)
+                for c in range(3):
+                    scratch[1 - source, kept, c] = scratch[source, m, c] + part * (
+                        scratch[source, n, c] - scratch[source, m, c]
+                    )
+                kept += 1
+        size, source = kept, 1 - source
+    return size, source

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from collision_monitor._jit import kernel
+from collision_monitor._jit import device, kernel
 from collision_monitor.world.rigid.rigid_bodies import RigidBodies
 
 DEPTH: Final = 0.02
@@ -69,15 +69,14 @@ def _spring_steps(
         for k in range(len(a)):
             i, j = a[k], b[k]
             mass = 1.0 / (inverse_mass[i] + inverse_mass[j])
+            slip = (
+                _slip(velocity, angular, i, j, arm_a, arm_b, k, 0), _slip(velocity, angular, i, j, arm_a, arm_b, k, 1),
+                _slip(velocity, angular, i, j, arm_a, arm_b, k, 2),
+            )  # fmt: skip
             speed, square = 0.0, 0.0
             for c in range(3):
-                d, e = (c + 1) % 3, (c + 2) % 3
-                slip = (
-                    velocity[j, c] + angular[j, d] * arm_b[k, e] - angular[j, e] * arm_b[k, d]
-                    - velocity[i, c] - angular[i, d] * arm_a[k, e] + angular[i, e] * arm_a[k, d]
-                )  # fmt: skip
-                speed += slip * normal[k, c]
-                square += slip * slip
+                speed += slip[c] * normal[k, c]
+                square += slip[c] * slip[c]
             if step > 0:
                 gap[k] += h * speed
             if gap[k] >= 0.0:
@@ -85,29 +84,11 @@ def _spring_steps(
             push = max(mass * frequency * (-frequency * gap[k] - damping * speed), 0.0)
             sideways = sqrt(max(square - speed * speed, 0.0))
             drag = min(friction[k] * push, mass * frequency * sideways) / sideways if sideways > 0.0 else 0.0
-            fx = fy = fz = 0.0
-            for c in range(3):
-                d, e = (c + 1) % 3, (c + 2) % 3
-                slip = (
-                    velocity[j, c] + angular[j, d] * arm_b[k, e] - angular[j, e] * arm_b[k, d]
-                    - velocity[i, c] - angular[i, d] * arm_a[k, e] + angular[i, e] * arm_a[k, d]
-                )  # fmt: skip
-                force = h * (push * normal[k, c] - drag * (slip - speed * normal[k, c]))
-                if c == 0:
-                    fx = force
-                elif c == 1:
-                    fy = force
-                else:
-                    fz = force
-            for side in range(2):
-                body, sign = (i, -1.0) if side == 0 else (j, 1.0)
-                arm = arm_a if side == 0 else arm_b
-                change[body, 0] += sign * fx
-                change[body, 1] += sign * fy
-                change[body, 2] += sign * fz
-                change[body, 3] += sign * (arm[k, 1] * fz - arm[k, 2] * fy)
-                change[body, 4] += sign * (arm[k, 2] * fx - arm[k, 0] * fz)
-                change[body, 5] += sign * (arm[k, 0] * fy - arm[k, 1] * fx)
+            fx = h * (push * normal[k, 0] - drag * (slip[0] - speed * normal[k, 0]))
+            fy = h * (push * normal[k, 1] - drag * (slip[1] - speed * normal[k, 1]))
+            fz = h * (push * normal[k, 2] - drag * (slip[2] - speed * normal[k, 2]))
+            _add(change, i, -1.0, fx, fy, fz, arm_a, k)
+            _add(change, j, 1.0, fx, fy, fz, arm_b, k)
         for n in range(len(velocity)):
             if inverse_mass[n] == 0.0:
                 continue
@@ -119,3 +100,24 @@ def _spring_steps(
             for c in range(3):
                 moved[n, c] += h * velocity[n, c]
                 turned[n, c] += h * angular[n, c]
+
+
+@device
+def _slip(velocity: Any, angular: Any, i: int, j: int, arm_a: Any, arm_b: Any, k: int, c: int) -> Any:
+    """Velocity (m/s) along axis c of body j at contact k, relative to body i there."""
+    d, e = (c + 1) % 3, (c + 2) % 3
+    return (
+        velocity[j, c] + angular[j, d] * arm_b[k, e] - angular[j, e] * arm_b[k, d]
+        - velocity[i, c] - angular[i, d] * arm_a[k, e] + angular[i, e] * arm_a[k, d]
+    )  # fmt: skip
+
+
+@device
+def _add(change: Any, body: int, sign: float, fx: float, fy: float, fz: float, arm: Any, k: int) -> None:
+    """Add an impulse (N s) at contact k, and its torque, to the change of a body."""
+    change[body, 0] += sign * fx
+    change[body, 1] += sign * fy
+    change[body, 2] += sign * fz
+    change[body, 3] += sign * (arm[k, 1] * fz - arm[k, 2] * fy)
+    change[body, 4] += sign * (arm[k, 2] * fx - arm[k, 0] * fz)
+    change[body, 5] += sign * (arm[k, 0] * fy - arm[k, 1] * fx)

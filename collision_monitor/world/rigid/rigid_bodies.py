@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.broad_phase.dense_grid import box_pairs
+from collision_monitor.broad_phase.box_pairs import box_pairs
 from collision_monitor.narrow_phase.contact_row import DISTANCE, NORMAL, POINT_A
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.response.contact_set import Bodies, Contacts

@@ -9,7 +9,8 @@ from named_features import agrees, off_feature, random_pose
 import collision_monitor as cm
 from collision_monitor import Pose
 from collision_monitor.query.contact.contact import contact
-from collision_monitor.query.contact.features import contact_features, feature_of, shape_tie
+from collision_monitor.query.contact.features import feature_of, shape_tie
+from collision_monitor.query.contact.features_in_contact import contact_features
 
 ROCK = cm.ConvexHull(np.random.default_rng(3).normal(size=(24, 3)) * 0.4)
 CUBE = cm.ConvexHull([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])

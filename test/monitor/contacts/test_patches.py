@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from started_threads import StartedThreads
 
 from collision_monitor import records
 from collision_monitor.monitor.monitor import Monitor
@@ -99,7 +100,7 @@ def test_a_cart_stands_on_its_wheels_and_a_polygon_on_its_edge() -> None:
 
 
 @pytest.mark.parametrize("most", [1, 2, 3, 4])
-def test_as_many_points_as_wanted_and_nothing_else_changes(most: int) -> None:
+def test_as_many_points_as_wanted_and_nothing_else_changes(most: int, started_threads: StartedThreads) -> None:
     scene = make_scene("clutter", objects=150)
     monitor, one = Monitor(Profile(contact_points=most, threads=2)), Monitor()
     for description in scene.descriptions:
@@ -131,6 +132,7 @@ def test_as_many_points_as_wanted_and_nothing_else_changes(most: int) -> None:
             assert all(np.linalg.norm(a - b) == pytest.approx(1.0) for a, b in pairwise(lying["point_a"]))
         seen |= set(mine.contact_rows["point_count"].tolist())
     assert seen == {1, most}
+    assert started_threads.most == 2, "those of the monitor with more points"
 
 
 def test_what_is_not_settled_has_one_point() -> None:

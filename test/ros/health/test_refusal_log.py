@@ -8,8 +8,8 @@ import pytest
 
 from collision_monitor import codec, records
 from collision_monitor.errors import Refusal
-from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.ros.health.refusal_log import PERIOD, RefusalLog
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Sphere
@@ -30,15 +30,20 @@ def lines():
 
 
 @pytest.fixture
-def monitor():
-    monitor = Monitor()
+def pipeline():
+    return Pipeline()
+
+
+@pytest.fixture
+def monitor(pipeline):
+    monitor = pipeline.monitor
     for object_id in range(1, 9):
         monitor.add(object_id, Sphere(0.5), name=f"ball {object_id}" if object_id != 2 else "\x1b[31mred\n")
     return monitor
 
 
-def test_a_flood_is_one_line_at_once_and_then_one_every_ten_seconds(monitor, lines):
-    log = RefusalLog(monitor, lines.append)
+def test_a_flood_is_one_line_at_once_and_then_one_every_ten_seconds(pipeline, monitor, lines):
+    log = RefusalLog(pipeline, lines.append)
     for k in range(25_000):  # 25 s at 1 kHz
         monitor.refuse(Refusal.FRAME, f"frame {k}")
         log.report("/states", k * SECOND // 1000)
@@ -55,8 +60,8 @@ def test_a_flood_is_one_line_at_once_and_then_one_every_ten_seconds(monitor, lin
     assert len(lines) == 4
 
 
-def test_each_kind_and_each_topic_has_its_line(monitor, lines):
-    log = RefusalLog(monitor, lines.append)
+def test_each_kind_and_each_topic_has_its_line(pipeline, monitor, lines):
+    log = RefusalLog(pipeline, lines.append)
     for reason in Refusal:
         monitor.refuse(reason, f"why {reason.value}", 3)
     log.report("/states", 0)
@@ -65,8 +70,8 @@ def test_each_kind_and_each_topic_has_its_line(monitor, lines):
     assert lines == [f"/states: why {reason.value} (3 times)" for reason in Refusal] + ["/shapes: another frame"]
 
 
-def test_nothing_refused_is_no_line(monitor, lines):
-    log = RefusalLog(monitor, lines.append)
+def test_nothing_refused_is_no_line(pipeline, monitor, lines):
+    log = RefusalLog(pipeline, lines.append)
     for k in range(100):
         monitor.step(k * SECOND // 50, np.stack([state(1), state(2, 5)]))
         log.report("/states", k)
@@ -75,8 +80,8 @@ def test_nothing_refused_is_no_line(monitor, lines):
     assert lines == []
 
 
-def test_two_kinds_in_one_message_have_their_own_texts(monitor, lines):
-    log = RefusalLog(monitor, lines.append)
+def test_two_kinds_in_one_message_have_their_own_texts(pipeline, monitor, lines):
+    log = RefusalLog(pipeline, lines.append)
     monitor.step(SECOND, np.stack([state(77), state(1, math.nan), state(2, 0, (0, 0, 0, 0))]))
     log.report("/states", 0)
     assert [line.split(",")[0] for line in lines] == [
@@ -86,8 +91,8 @@ def test_two_kinds_in_one_message_have_their_own_texts(monitor, lines):
     ]
 
 
-def test_a_restart_is_logged_at_once_although_the_jump_was_refused_just_before(monitor, lines):
-    log = RefusalLog(monitor, lines.append)
+def test_a_restart_is_logged_at_once_although_the_jump_was_refused_just_before(pipeline, monitor, lines):
+    log = RefusalLog(pipeline, lines.append)
     for k, stamp in enumerate((60 * SECOND, 61 * SECOND, SECOND, SECOND + 1)):
         monitor.step(stamp, np.stack([state(1)]))
         log.report("/states", k)
@@ -96,8 +101,8 @@ def test_a_restart_is_logged_at_once_although_the_jump_was_refused_just_before(m
     assert "time jumped by -60.000 s" in lines[1]
 
 
-def test_stale_objects_are_named_in_one_printable_line(monitor, lines):
-    log = RefusalLog(monitor, lines.append)
+def test_stale_objects_are_named_in_one_printable_line(pipeline, monitor, lines):
+    log = RefusalLog(pipeline, lines.append)
     monitor.step(0, np.stack([state(k, 5 * k) for k in range(1, 9)]))
     for k in range(1, 200):  # 20 s
         monitor.step(k * SECOND // 10, np.stack([state(8)]))

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from session_scene import CONTACTS, PREDICTIONS, STATES, STATUS, TYPES, record
+from started_threads import StartedThreads
 
 from collision_monitor.cli.main import main
 from collision_monitor.codec import decode_contacts, decode_status, encode_contacts, encode_status
@@ -40,8 +41,9 @@ def step_of(message: Recorded) -> int:
 
 
 @pytest.mark.parametrize("threads", [None, 1, 2])
-def test_a_replay_gives_the_same_bytes(recorded: Path, threads: int | None) -> None:
+def test_a_replay_gives_the_same_bytes(recorded: Path, threads: int | None, started_threads: StartedThreads) -> None:
     report = replay(Session(recorded), threads=threads)
+    assert started_threads.most == (2 if threads == 2 else 0)
     assert (report.verdict, report.first_difference, report.notes) == (Verdict.IDENTICAL, None, [])
     assert report.steps == 50
     assert report.compared == 50 + 50 + 11  # contacts, predictions, statuses

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from session_scene import NODE, SETTINGS, START, STEP, record
+from started_threads import StartedThreads, threads_start
 
 from collision_monitor.cli.main import main
 from collision_monitor.codec import decode_contacts, decode_parameter_event, decode_status, encode_parameter_event
@@ -26,13 +27,16 @@ SWITCHES = {20: FAST, 35: Profile.named("exact").replace(threads=2, contact_poin
 @pytest.fixture(scope="module")
 def switched(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("switched") / "run.mcap"
-    record(path, switches=SWITCHES)
+    with threads_start() as started:
+        record(path, switches=SWITCHES)
+    assert started.most == 2, "the last profile has two threads"
     return path
 
 
 @pytest.mark.parametrize("threads", [None, 1, 2])
-def test_it_replays_bit_by_bit(switched: Path, threads: int | None) -> None:
+def test_it_replays_bit_by_bit(switched: Path, threads: int | None, started_threads: StartedThreads) -> None:
     report = replay(Session(switched), threads=threads)
+    assert started_threads.most == (0 if threads == 1 else 2), "as recorded, the last profile has two"
     assert (report.verdict, report.first_difference, report.notes) == (Verdict.IDENTICAL, None, [])
     assert main(["replay", str(switched)]) == 0
 

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 from session_scene import CONTACTS, STEP, record
+from started_threads import threads_start
 
 from collision_monitor.cli.main import main
 from collision_monitor.codec import decode_contacts, encode_contacts
@@ -61,7 +62,9 @@ def test_from_every_snapshot_the_answers_are_those_of_the_whole(path: Path, reco
     for place in timeline.snapshots:
         start = (place.log_time - timeline.begin) * 1e-9 + 1e-6
         for threads in (1, 2):
-            report = replay(Session(path), start=start, threads=threads)
+            with threads_start() as started:
+                report = replay(Session(path), start=start, threads=threads)
+            assert started.most == (threads if threads > 1 else 0)
             assert report.verdict is Verdict.IDENTICAL
             assert report.begin == pytest.approx(start - 1e-6)
             assert (report.digest, report.steps) == (whole.digest, whole.steps)

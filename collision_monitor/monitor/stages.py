@@ -1,0 +1,138 @@
+"""The stages of a monitor: what it keeps between two steps, and what anyone may read of that."""
+
+from __future__ import annotations
+
+from collision_monitor.errors import Refusal
+from collision_monitor.monitor.active_pairs import ActivePairs
+from collision_monitor.monitor.answers import Answers
+from collision_monitor.monitor.budget import StepClock
+from collision_monitor.monitor.candidates import Candidates
+from collision_monitor.monitor.event_list import EventList
+from collision_monitor.monitor.first_impacts import FirstImpacts
+from collision_monitor.monitor.intake import Intake
+from collision_monitor.monitor.refusals import Refusals
+from collision_monitor.monitor.result import StepResult
+from collision_monitor.monitor.scene_plan import ScenePlan, scene_plan
+from collision_monitor.monitor.state.roster import Roster
+from collision_monitor.monitor.state.snapshot import Snapshot, Stage, save_stages
+from collision_monitor.monitor.state.timeline import Timeline
+from collision_monitor.monitor.step_context import KernelSettings
+from collision_monitor.monitor.time_critical import TimeCritical
+from collision_monitor.monitor.tracking import Tracking
+from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
+from collision_monitor.settings.profile import Profile
+
+
+class Stages:
+    """The profile and the stages of a `Monitor`, which runs them. Reading changes nothing."""
+
+    def __init__(self, profile: Profile, *, timed: bool, warns: bool) -> None:
+        self._profile = profile
+        self._settings = KernelSettings.of(profile)
+        self._roster = Roster()
+        self._timeline = Timeline()
+        self._refusals = Refusals(warns=warns)
+        self._intake = Intake()
+        self._tracking = Tracking()
+        self._candidates = Candidates()
+        self._first_impacts = FirstImpacts(profile.threads)
+        self._events = EventList()
+        self._active_pairs = ActivePairs()
+        self._time_critical = TimeCritical(timed=timed)
+        self._uncertain = UncertainPredictions(self._roster.capacity)
+        self._answers = Answers()
+
+    @property
+    def stages(self) -> tuple[Stage, ...]:
+        """The stages that keep state between two steps, in the order in which they are restored."""
+        return (
+            *(self._roster, self._timeline, self._refusals, self._intake, self._tracking, self._candidates),
+            *(self._first_impacts, self._events, self._active_pairs, self._time_critical, self._uncertain),
+            self._answers,
+        )
+
+    def snapshot(self) -> Snapshot:
+        """Copy all state that later answers depend on; each stage saves its own."""
+        return save_stages(self.stages)
+
+    # ------------------------------------------------------------------ objects
+
+    @property
+    def roster(self) -> Roster:
+        """The objects and their last states, for reading."""
+        return self._roster
+
+    @property
+    def ids(self) -> list[int]:
+        """The ids of all described objects, ascending."""
+        return self._roster.ids
+
+    def __contains__(self, object_id: int) -> bool:
+        """Whether the object is described."""
+        return object_id in self._roster
+
+    def name(self, object_id: int) -> str:
+        """Name of an object, for display. Raises InputError for an unknown id."""
+        return self._roster.name(object_id)
+
+    @property
+    def stale_ids(self) -> list[int]:
+        """Ids of the objects that are stale at the latest time, ascending."""
+        if self._answers.last is None or not self._timeline.has_begun:
+            return []
+        return self._roster.stale_ids(self._timeline.now, self._profile.stale_after)
+
+    @property
+    def unseen_ids(self) -> list[int]:
+        """Ids of the moving objects without any state, ascending."""
+        return self._roster.unseen_ids()
+
+    @property
+    def plan(self) -> ScenePlan:
+        """The tests and grid cells that the objects described now require; `print` shows them."""
+        is_uncertain = self._uncertain.counts(self._profile)
+        return scene_plan(self._roster, self._candidates.grid, uncertain=is_uncertain, outside=self._tracking.outside)
+
+    # ------------------------------------------------------------------ time
+
+    @property
+    def now(self) -> float:
+        """The latest time (s after the first stamp); the states in `roster` have such times."""
+        return self._timeline.now
+
+    @property
+    def restarts(self) -> int:
+        """Number of times that the timeline restarted because time jumped."""
+        return self._timeline.restarts
+
+    @property
+    def clock(self) -> StepClock:
+        """The clock of the steps. To publish answers within the budget, enter it and call `take_step`."""
+        return self._time_critical.clock
+
+    # ------------------------------------------------------------------ answers
+
+    @property
+    def last(self) -> StepResult | None:
+        """The answers of the last accepted step; None before the first."""
+        return self._answers.last
+
+    @property
+    def digest(self) -> int:
+        """64-bit digest of all answers so far."""
+        return self._answers.digest
+
+    @property
+    def refused(self) -> dict[Refusal, int]:
+        """Number of refused inputs by reason."""
+        return self._refusals.counts
+
+    @property
+    def last_refusal(self) -> str:
+        """Text of the last refusal, or of the last restart of the timeline, whichever came later."""
+        return self._refusals.last
+
+    @property
+    def refusal_texts(self) -> dict[Refusal, str]:
+        """Text of the last refusal by reason; empty: there was none. That of a restart is the one of TIME."""
+        return self._refusals.texts
