@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from collision_monitor.accuracy.detection_time import WARM_UP_FRAMES
-from collision_monitor.cli.options.quantities import positive, whole
+from collision_monitor.cli.options.quantities import positive_number, whole
 from collision_monitor.cli.options.usage import UsageError, usage
 from collision_monitor.cli.output.exit_codes import ExitCode
 
@@ -72,7 +72,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument(
         "--packing",
-        type=positive,
+        type=positive_number,
         metavar="P",
         help="part of space that hard spheres fill (default: 0.45); for hard-spheres only",
     )

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from collision_monitor.cli.child import PATIENCE, Child, ProcessError
-from collision_monitor.cli.options.quantities import positive, whole
+from collision_monitor.cli.options.quantities import positive_number, whole
 from collision_monitor.cli.options.usage import usage
 from collision_monitor.cli.output.exit_codes import ExitCode
 from collision_monitor.cli.output.output_file import add_force, check_outputs, writing
@@ -74,12 +74,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--objects", type=whole(1), metavar="N", help="number of moving objects (default: depends on the scene)"
     )
     parser.add_argument(
-        "--duration", type=positive, default=10.0, metavar="S", help="duration of the scene (s, default: 10)"
+        "--duration", type=positive_number, default=10.0, metavar="S", help="duration of the scene (s, default: 10)"
     )
     parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="seed of the random numbers (default: 1)")
     parser.add_argument("--path", type=Path, metavar="FILE", help="recorded tracks for the scene `trajectory`")
     parser.add_argument(
-        "--noise", type=positive, metavar="S", help="standard deviation of the states (m, rad, m/s, rad/s)"
+        "--noise", type=positive_number, metavar="S", help="standard deviation of the states (m, rad, m/s, rad/s)"
     )
     parser.add_argument(
         "--output", type=Path, metavar="PATH", help="new session file (default: sessions/SCENE-DATE.mcap)"

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from collision_monitor.cli.options.engines import RAY, add_engine, engine_of
-from collision_monitor.cli.options.quantities import not_negative, positive
+from collision_monitor.cli.options.quantities import not_negative, positive_number
 from collision_monitor.cli.options.usage import UsageError, usage
 from collision_monitor.cli.output.exit_codes import ExitCode
 from collision_monitor.cli.output.output_file import add_force, check_outputs
@@ -63,7 +63,7 @@ def add_parser(subparsers: Any) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--tolerance",
-        type=positive,
+        type=positive_number,
         metavar="X",
         help="for sessions of other versions: largest difference of equal numbers (m, s)",
     )

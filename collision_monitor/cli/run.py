@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from collision_monitor.cli.options.parameter_file import check_parameter_file
-from collision_monitor.cli.options.quantities import positive, size
+from collision_monitor.cli.options.quantities import positive_number, size
 from collision_monitor.cli.options.ros_arguments import parameters
 from collision_monitor.cli.options.usage import UsageError, given_rules, usage
 from collision_monitor.errors import SessionError
@@ -59,19 +59,22 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--split-size", type=size, metavar="SIZE", help="start a new file in the folder at this size, for example 500M"
     )
     parser.add_argument(
-        "--split-duration", type=positive, metavar="S", help="start a new file in the folder every S seconds"
+        "--split-duration", type=positive_number, metavar="S", help="start a new file in the folder every S seconds"
     )
     parser.add_argument(
         "--on-event", action="store_true", help="record only the time around collisions, each in its own file"
     )
     parser.add_argument(
         "--before",
-        type=positive,
+        type=positive_number,
         metavar="S",
         help="with --on-event: time to keep before a collision begins (s, default: 10)",
     )
     parser.add_argument(
-        "--after", type=positive, metavar="S", help="with --on-event: time to keep after it begins (s, default: 5)"
+        "--after",
+        type=positive_number,
+        metavar="S",
+        help="with --on-event: time to keep after it begins (s, default: 5)",
     )
     parser.add_argument("--profile", metavar="NAME", help="profile that sets the defaults: fast, balanced or exact")
     parser.add_argument("--ros-args", nargs=argparse.REMAINDER, default=[], metavar="…", help="arguments for ROS")

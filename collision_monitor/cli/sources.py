@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from collision_monitor.cli.options.quantities import positive
+from collision_monitor.cli.options.quantities import positive_number
 from collision_monitor.cli.options.usage import usage
 from collision_monitor.cli.output.exit_codes import ExitCode
 
@@ -47,7 +47,9 @@ def add_parser(subparsers: Any) -> None:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--check", type=Path, metavar="FILE", help="sources file (YAML) to check against the graph")
-    parser.add_argument("--seconds", type=positive, default=3.0, metavar="S", help="time to listen (s, default: 3)")
+    parser.add_argument(
+        "--seconds", type=positive_number, default=3.0, metavar="S", help="time to listen (s, default: 3)"
+    )
     parser.set_defaults(command=sources_command)
 
 

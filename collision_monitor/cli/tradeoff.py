@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from collision_monitor.accuracy.tradeoff.default_scenes import DEFAULT_SCENES
-from collision_monitor.cli.options.quantities import not_negative, positive, whole
+from collision_monitor.cli.options.quantities import not_negative, positive_number, whole
 from collision_monitor.cli.options.usage import UsageError, check_profiles, check_unused, usage
 from collision_monitor.cli.output.exit_codes import ExitCode
 from collision_monitor.cli.output.missing import print_missing
@@ -80,7 +80,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     )
     parser.add_argument(
         "--seconds",
-        type=positive,
+        type=positive_number,
         metavar="S",
         help="duration of each scene (s, default: 5, or all of the recorded tracks)",
     )

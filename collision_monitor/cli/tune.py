@@ -11,7 +11,7 @@ from pathlib import Path
 from shlex import quote
 from typing import TYPE_CHECKING, Any
 
-from collision_monitor.cli.options.quantities import positive, whole
+from collision_monitor.cli.options.quantities import positive_number, whole
 from collision_monitor.cli.options.usage import usage
 from collision_monitor.cli.output.exit_codes import ExitCode
 from collision_monitor.cli.output.missing import print_missing
@@ -58,18 +58,20 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("session", type=Path, metavar="SESSION", help=".mcap file, or a folder that holds one session")
     parser.add_argument(
-        "--max-distance-error", type=positive, metavar="M", help="largest error of a contact's distance (m)"
+        "--max-distance-error", type=positive_number, metavar="M", help="largest error of a contact's distance (m)"
     )
     parser.add_argument(
-        "--max-ttc-error", type=positive, metavar="S", help="largest error of a predicted time to collision (s)"
+        "--max-ttc-error", type=positive_number, metavar="S", help="largest error of a predicted time to collision (s)"
     )
-    parser.add_argument("--budget-ms", type=positive, metavar="MS", help="largest time of a step on this machine (ms)")
     parser.add_argument(
-        "--max-probability-error", type=positive, metavar="P",
+        "--budget-ms", type=positive_number, metavar="MS", help="largest time of a step on this machine (ms)"
+    )
+    parser.add_argument(
+        "--max-probability-error", type=positive_number, metavar="P",
         help="largest standard error of a probability; keeps `uncertainty` on (default: probabilities are not needed)",
     )  # fmt: skip
     parser.add_argument(
-        "--min-horizon", type=positive, metavar="S", help="shortest horizon (s, default: that of the session)"
+        "--min-horizon", type=positive_number, metavar="S", help="shortest horizon (s, default: that of the session)"
     )
     parser.add_argument("-j", "--jobs", type=whole(1), metavar="N", help="number of processes (default: all cores)")
     parser.add_argument(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from collision_monitor.cli.options.quantities import not_negative, positive, whole
+from collision_monitor.cli.options.quantities import not_negative, positive_number, whole
 from collision_monitor.cli.options.ros_arguments import parameters
 from collision_monitor.cli.options.usage import UsageError, usage
 from collision_monitor.pipeline.topics import NODE
@@ -44,14 +44,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--objects", type=whole(1), metavar="N", help="number of moving objects (default: depends on the scene)"
     )
     parser.add_argument(
-        "--rate", type=positive, metavar="HZ", help="messages per second (Hz, default: depends on the scene)"
+        "--rate", type=positive_number, metavar="HZ", help="messages per second (Hz, default: depends on the scene)"
     )
-    parser.add_argument("--duration", type=positive, metavar="S", help="stop after this time (s, default: never)")
+    parser.add_argument(
+        "--duration", type=positive_number, metavar="S", help="stop after this time (s, default: never)"
+    )
     parser.add_argument("--seed", type=whole(0), default=1, metavar="K", help="seed of the random numbers (default: 1)")
     parser.add_argument("--path", type=Path, metavar="FILE", help="recorded tracks for the scene `trajectory`")
     parser.add_argument(
         "--noise",
-        type=positive,
+        type=positive_number,
         metavar="S",
         help="standard deviation of the states, which declare it (m, rad, m/s, rad/s)",
     )

@@ -80,7 +80,7 @@ def posed(shape: Compound, pose: Pose, model: Model | str | ArrayLike, name: str
     return Posed(shapes, pose, modelled.pieces, modelled.model, modelled.excess)
 
 
-def check_in_plane(side: Posed) -> None:
+def check_side_in_plane(side: Posed) -> None:
     """Check that an object of the x-y plane lies in it. Raises PoseError."""
     if abs(side.pose.rotation[2, 2]) < 1.0 - UNIT_QUATERNION or side.pose.rotation[2, 2] < 0.0:
         raise PoseError(f"expected a turn about z for a shape of the plane, got the quaternion {side.pose.quaternion}")

@@ -44,7 +44,7 @@ def set_positive(shape: Shape, names: Sequence[str]) -> None:
         object.__setattr__(shape, name, positive(getattr(shape, name), what))
 
 
-def extents(value: Any, what: str, example: str) -> tuple[float, float, float]:
+def full_extents(value: Any, what: str, example: str) -> tuple[float, float, float]:
     """Return three full extents in metres, not all zero. Raises ShapeError."""
     try:
         size = tuple(float(s) for s in value)

@@ -23,7 +23,7 @@ def whole(least: int, most: int | None = None) -> Callable[[str], int]:
     return parse
 
 
-def positive(text: str) -> float:
+def positive_number(text: str) -> float:
     """Parse a finite number above 0."""
     value = _finite(text)
     if not value > 0.0:

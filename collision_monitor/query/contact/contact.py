@@ -30,7 +30,7 @@ from collision_monitor.query.contact.nearest_pieces import NearestPieces
 from collision_monitor.query.contact.open_gap import distance_of_fillings
 from collision_monitor.query.contact.parting import parting_translation
 from collision_monitor.query.piece_table import exact_piece_table
-from collision_monitor.query.posed import check_in_plane, posed
+from collision_monitor.query.posed import check_side_in_plane, posed
 from collision_monitor.records import Model
 from collision_monitor.shapes.planar import is_planar
 from collision_monitor.shapes.pose import Pose
@@ -185,8 +185,8 @@ def _contact(
             f"got {', '.join(kinds)}"
         )
     if planes == {True}:
-        check_in_plane(a)
-        check_in_plane(b)
+        check_side_in_plane(a)
+        check_side_in_plane(b)
     offset = b.pose.position - a.pose.position
     deepest = by_clouds(a, b, offset) or by_trees(a, b, offset) or by_pieces(a, b, offset)
     row = deepest.row

@@ -18,7 +18,7 @@ Color = tuple[float, float, float, float]
 """Red, green, blue, alpha, each 0 to 1."""
 
 
-class Kind(IntEnum):
+class MarkerKind(IntEnum):
     """Values of `Marker.type`."""
 
     LINE_LIST = 5
@@ -32,7 +32,7 @@ class Marker:
     """One marker: all points (n, 3) in the frame of the array, one colour."""
 
     namespace: str
-    kind: Kind
+    kind: MarkerKind
     color: Color
     points: NDArray[np.float64] = field(default_factory=lambda: _NO_POINTS)
     scale: tuple[float, float, float] = (1.0, 1.0, 1.0)

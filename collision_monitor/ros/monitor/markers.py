@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from collision_monitor.codec import Change, Removal
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.pipeline.catalogue import Catalogue
-from collision_monitor.ros.monitor.marker_bytes import Color, Kind, Marker, encode
+from collision_monitor.ros.monitor.marker_bytes import Color, Marker, MarkerKind, encode
 from collision_monitor.shapes.pose import Pose, rotation_matrix
 from collision_monitor.shapes.registry import kind_of
 
@@ -94,11 +94,11 @@ class MarkerView:
         world = self._world_vertices()
 
         def surface(namespace: str, color: Color, which: NDArray[np.bool_]) -> Marker:
-            return Marker(namespace, Kind.TRIANGLE_LIST, color, world[(which & seen)[self._owner]])
+            return Marker(namespace, MarkerKind.TRIANGLE_LIST, color, world[(which & seen)[self._owner]])
 
         static = np.concatenate(list(self._static.values())) if self._static else np.empty((0, 3))
         markers = [
-            Marker("static", Kind.TRIANGLE_LIST, _STATIC, static),
+            Marker("static", MarkerKind.TRIANGLE_LIST, _STATIC, static),
             surface("clear", _CALM, ~touching & ~predicted),
             surface("predicted", _PREDICTED, predicted),
             surface("touching", _TOUCHING, touching),
@@ -126,16 +126,16 @@ def _contact_markers(contacts: NDArray[np.void]) -> list[Marker]:
     start = known["point_a"]
     lines = np.stack([start, start + _NORMAL_LENGTH * known["normal"]], axis=1).reshape(-1, 3)
     return [
-        Marker("contact points", Kind.SPHERE_LIST, _CONTACT, start, (0.1, 0.1, 0.1)),
-        Marker("contact normals", Kind.LINE_LIST, _CONTACT, lines, (0.03, 0.0, 0.0)),
+        Marker("contact points", MarkerKind.SPHERE_LIST, _CONTACT, start, (0.1, 0.1, 0.1)),
+        Marker("contact normals", MarkerKind.LINE_LIST, _CONTACT, lines, (0.03, 0.0, 0.0)),
     ]
 
 
 def _prediction_markers(predictions: NDArray[np.void]) -> list[Marker]:
     known = predictions[np.isfinite(predictions["point"]).all(axis=1)]
-    markers = [Marker("predicted impacts", Kind.SPHERE_LIST, _PREDICTED, known["point"], (0.15, 0.15, 0.15))]
+    markers = [Marker("predicted impacts", MarkerKind.SPHERE_LIST, _PREDICTED, known["point"], (0.15, 0.15, 0.15))]
     for i in range(_LABELS):
-        label = Marker("time left", Kind.TEXT, _PREDICTED, scale=(0.0, 0.0, 0.4), number=i)
+        label = Marker("time left", MarkerKind.TEXT, _PREDICTED, scale=(0.0, 0.0, 0.4), number=i)
         if i < len(known):
             x, y, z = (float(c) for c in known["point"][i])
             label = replace(label, position=(x, y, z + 0.5), text=f"{known['lower'][i]:.2f} s")

@@ -17,7 +17,7 @@ from collision_monitor.shapes.feature_types import EDGE, FACE, VERTEX
 from collision_monitor.shapes.kind import Fields, Kind, Row
 from collision_monitor.shapes.mass import MassProperties
 from collision_monitor.shapes.rays import RayInterval, planes_interval
-from collision_monitor.shapes.shape import Array, Shape, extents
+from collision_monitor.shapes.shape import Array, Shape, full_extents
 from collision_monitor.shapes.surface_parts import UNIT_CORNERS, box_triangles
 
 BOX: Final = int(ShapeType.BOX)
@@ -47,7 +47,7 @@ class Box(Shape):
         return super().__new__(cls)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "size", extents(self.size, "Box size", "Box((1, 1, 1))"))
+        object.__setattr__(self, "size", full_extents(self.size, "Box size", "Box((1, 1, 1))"))
 
     @property
     def corners(self) -> Array:

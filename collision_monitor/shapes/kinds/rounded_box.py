@@ -18,7 +18,7 @@ from collision_monitor.shapes.kinds.box import BOX, box_interval, feature_of_box
 from collision_monitor.shapes.kinds.sphere import SPHERE, unit_sphere_surface
 from collision_monitor.shapes.mass import MassProperties
 from collision_monitor.shapes.rays import RayInterval, ball_interval, common_interval, slab_interval, tube_interval
-from collision_monitor.shapes.shape import Array, Shape, extents, positive
+from collision_monitor.shapes.shape import Array, Shape, full_extents, positive
 from collision_monitor.shapes.surface_parts import Triangles, hull_triangles
 
 
@@ -36,7 +36,7 @@ class RoundedBox(Shape):
     radius: float
 
     def __post_init__(self) -> None:
-        size = extents(self.size, "RoundedBox size", "RoundedBox((1, 1, 1), radius=0.1)")
+        size = full_extents(self.size, "RoundedBox size", "RoundedBox((1, 1, 1), radius=0.1)")
         radius = positive(self.radius, "RoundedBox radius")
         if 2.0 * radius > min(size):
             most = f"half of the smallest extent ({min(size) / 2:g} m)"

@@ -7,7 +7,7 @@ from rclpy.serialization import deserialize_message
 from visualization_msgs.msg import Marker as RosMarker
 from visualization_msgs.msg import MarkerArray
 
-from collision_monitor.ros.monitor.marker_bytes import Kind, Marker, encode
+from collision_monitor.ros.monitor.marker_bytes import Marker, MarkerKind, encode
 from collision_monitor.shapes.registry import (
     Box,
     Capsule,
@@ -26,9 +26,11 @@ from collision_monitor.shapes.registry import (
 def test_rclpy_reads_what_was_written():
     points = np.random.default_rng(1).normal(size=(6, 3))
     markers = [
-        Marker("touching", Kind.TRIANGLE_LIST, (0.25, 0.5, 0.75, 1.0), points),
-        Marker("überall", Kind.TEXT, (1, 0, 0, 1), scale=(0, 0, 0.4), number=7, position=(1, 2, 3), text="0.42 s"),
-        Marker("gone", Kind.LINE_LIST, (1, 1, 1, 1)),
+        Marker("touching", MarkerKind.TRIANGLE_LIST, (0.25, 0.5, 0.75, 1.0), points),
+        Marker(
+            "überall", MarkerKind.TEXT, (1, 0, 0, 1), scale=(0, 0, 0.4), number=7, position=(1, 2, 3), text="0.42 s"
+        ),
+        Marker("gone", MarkerKind.LINE_LIST, (1, 1, 1, 1)),
     ]
     read = deserialize_message(encode(12_000_000_034, "map", markers), MarkerArray).markers
     first, text, gone = read
