@@ -16,7 +16,7 @@ import numpy as np
 from collision_monitor.objects.models import Modelled
 from collision_monitor.records import Model
 from collision_monitor.shapes.kinds.convex_hull import TRIANGLE
-from collision_monitor.shapes.pose import Array, Pose
+from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import KINDS
 
 _REASON: Final = "reason"
@@ -64,7 +64,8 @@ def _decoded(arrays: dict[str, Any]) -> Modelled | str:
         if dot:
             values[int(k)][name] = value
     pieces = [_CLASSES[kind](**own) for kind, own in zip(arrays["kinds"].tolist(), values, strict=True)]
-    poses = [_pose(*numbers) for numbers in zip(arrays["positions"], arrays["quaternions"], strict=True)]
+    numbers = zip(arrays["positions"].tolist(), arrays["quaternions"].tolist(), strict=True)
+    poses = [Pose.of_numbers((*position, *quaternion)) for position, quaternion in numbers]
     return Modelled(
         pieces=list(zip(pieces, poses, strict=True)),
         shapes=arrays["shapes"].tolist(),
@@ -73,12 +74,3 @@ def _decoded(arrays: dict[str, Any]) -> Modelled | str:
         convex=bool(arrays["convex"]),
         corners=tuple(arrays[f"{k}/corners"] if known else None for k, known in enumerate(arrays["corners"])),
     )
-
-
-def _pose(position: Array, quaternion: Array) -> Pose:
-    """Return a pose of exactly these numbers."""
-    pose = object.__new__(Pose)
-    for name, value in (("position", position), ("quaternion", quaternion)):
-        value.setflags(write=False)
-        object.__setattr__(pose, name, value)
-    return pose

@@ -85,11 +85,7 @@ def pose_rows(value: Any, name: str) -> Array:
 
 def pose_of(row: Array) -> Pose:
     """Pose of a row of `pose_rows` to the bit: normalising its quaternion again could change the last one."""
-    pose = Pose(row[:3])
-    quaternion = row[3:7].copy()
-    quaternion.flags.writeable = False
-    object.__setattr__(pose, "quaternion", quaternion)
-    return pose
+    return Pose.of_numbers(row[:7].tolist())
 
 
 def number_rows(value: Any, width: int, name: str) -> Array:

@@ -5,9 +5,11 @@ Quaternions are (x, y, z, w), as in ROS. A rotation matrix R_WA takes vectors of
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import contextlib
+from collections.abc import Iterable
 from functools import cached_property
-from typing import Any, Self
+from math import sqrt
+from typing import Any, Final, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -87,27 +89,127 @@ def rotation_matrix(quaternion: ArrayLike) -> Array:
     return np.array(rows) if q.ndim == 1 else np.ascontiguousarray(np.moveaxis(np.array(rows), (0, 1), (-2, -1)))
 
 
-@dataclass(frozen=True, eq=False)
-class Pose:
+def _plain(value: Any) -> Any:
+    """Return a tuple or a list, whose numbers Python reads faster than those of an array. Raises TypeError."""
+    kind = type(value)
+    if kind is tuple or kind is list:
+        return value
+    if kind is np.ndarray:
+        return value.tolist()
+    raise TypeError
+
+
+def _float(value: Any) -> float:
+    if isinstance(value, str | bytes | bytearray):
+        raise TypeError
+    return float(value)
+
+
+def _three(value: Any) -> tuple[float, float, float]:
+    """Return three finite numbers. Raises one of _REFUSED for anything else."""
+    x, y, z = _plain(value)
+    if not (type(x) is float and type(y) is float and type(z) is float):
+        x, y, z = _float(x), _float(y), _float(z)
+    if (
+        -LARGEST_INPUT <= x <= LARGEST_INPUT
+        and -LARGEST_INPUT <= y <= LARGEST_INPUT
+        and -LARGEST_INPUT <= z <= LARGEST_INPUT
+    ):
+        return x, y, z
+    raise ValueError
+
+
+_REFUSED: Final = (TypeError, ValueError, OverflowError)
+
+
+def _matrix_rows(matrix: Any) -> list[list[float]]:
+    """Return the rows of a matrix (4, 4) or (3, 3) of finite numbers. Raises PoseError."""
+    try:
+        X = np.array(matrix, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise PoseError(f"matrix: expected numbers (4, 4) or (3, 3), got {matrix!r}") from None
+    if X.shape not in ((4, 4), (3, 3)):
+        raise PoseError(f"matrix: expected shape (4, 4) or (3, 3), got {X.shape}")
+    rows: list[list[float]] = X.tolist()
+    return rows
+
+
+class Frozen:
+    """Base of the values that never change: their attributes are set once, in their own dictionary."""
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise AttributeError(f"{type(self).__name__} never changes: make another one in place of setting {name}")
+
+    def __delattr__(self, name: str) -> None:
+        raise AttributeError(f"{type(self).__name__} never changes: its {name} stays")
+
+
+class Pose(Frozen):
     """Pose of a body: position (m) and orientation (unit quaternion x, y, z, w). Raises PoseError.
+
+    position (3,), quaternion (4,) and rotation (3, 3) are read-only arrays; numbers has x, y, z, qx, qy, qz, qw.
 
     >>> (Pose((1, 0, 0)) @ Pose((0, 2, 0))).position
     array([1., 2., 0.])
     """
 
-    position: Any = (0.0, 0.0, 0.0)
-    quaternion: Any = (0.0, 0.0, 0.0, 1.0)
+    numbers: tuple[float, ...]
+    position: Array
+    quaternion: Array
 
-    def __new__(cls, *args: Any, **kwargs: Any) -> Self:
-        """Refuse three numbers in place of a position."""
-        if len(args) > 2:
-            raise PoseError(f"Pose: expected a position and a quaternion, got {len(args)} arguments; "
-                            "write Pose((x, y, z))")  # fmt: skip
-        return super().__new__(cls)
+    def __init__(self, position: Any = (0.0, 0.0, 0.0), quaternion: Any = (0.0, 0.0, 0.0, 1.0), *others: Any) -> None:
+        if others:  # three numbers in place of a position
+            raise PoseError(
+                f"Pose: expected a position and a quaternion, got {2 + len(others)} arguments; write Pose((x, y, z))"
+            )
+        try:
+            at = _three(position)
+            x, y, z, w = _plain(quaternion)
+            if not (type(x) is float and type(y) is float and type(z) is float and type(w) is float):
+                x, y, z, w = _float(x), _float(y), _float(z), _float(w)
+        except _REFUSED:
+            at = tuple(checked_vector(position, "position").tolist())
+            x, y, z, w = checked_vector(quaternion, "quaternion", 4).tolist()
+        norm = sqrt(x * x + y * y + z * z + w * w)
+        if norm == 1.0:
+            self.__dict__["numbers"] = (*at, x, y, z, w)
+        elif abs(norm - 1.0) <= UNIT_QUATERNION:
+            self.__dict__["numbers"] = (*at, x / norm, y / norm, z / norm, w / norm)
+        else:
+            checked_vector((x, y, z, w), "quaternion", 4)
+            raise PoseError(
+                f"quaternion: expected x, y, z, w of unit length within {UNIT_QUATERNION:g}, "
+                f"got {[x, y, z, w]} of length {norm:g}"
+            )
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "position", checked_vector(self.position, "position"))
-        object.__setattr__(self, "quaternion", unit_quaternion(self.quaternion))
+    @classmethod
+    def of_numbers(cls, numbers: Iterable[float]) -> Self:
+        """Pose of x, y, z and a unit quaternion x, y, z, w to the bit: to normalise it again could change it."""
+        made = cls.__new__(cls)
+        made.__dict__["numbers"] = tuple(numbers)
+        return made
+
+    def __getattr__(self, name: str) -> Any:
+        """Make an array when it is first read: a query reads the numbers alone."""
+        if name == "position":
+            value = np.array(self.numbers[:3])
+        elif name == "quaternion":
+            value = np.array(self.numbers[3:])
+        else:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
+        value.setflags(write=False)
+        self.__dict__[name] = value
+        return value
+
+    def __repr__(self) -> str:
+        """Return the numbers for a person."""
+        x, y, z, *q = self.numbers
+        turned = "" if q == [0.0, 0.0, 0.0, 1.0] else f", quaternion=({', '.join(f'{each:.6g}' for each in q)})"
+        return f"{type(self).__name__}(({x:.6g}, {y:.6g}, {z:.6g}){turned})"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles hold the numbers alone."""
+        return type(self).of_numbers, (self.numbers,)
 
     @classmethod
     def from_matrix(cls, matrix: ArrayLike) -> Self:
@@ -116,28 +218,31 @@ class Pose:
         >>> Pose.from_matrix([[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]).position
         array([1., 2., 3.])
         """
-        try:
-            X = np.array(matrix, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError):
-            raise PoseError(f"matrix: expected numbers (4, 4) or (3, 3), got {matrix!r}") from None
-        if X.shape not in ((4, 4), (3, 3)):
-            raise PoseError(f"matrix: expected shape (4, 4) or (3, 3), got {X.shape}")
-        if X.shape == (4, 4) and (X[3] != (0.0, 0.0, 0.0, 1.0)).any():
-            raise PoseError(f"matrix: expected the last row 0 0 0 1, got {X[3].tolist()}")
-        R, position = X[:3, :3], X[:3, 3] if X.shape == (4, 4) else (0.0, 0.0, 0.0)
-        if not np.abs(R @ R.T - np.eye(3)).max() <= UNIT_QUATERNION or not np.linalg.det(R) > 0.0:
-            raise PoseError(f"matrix: expected a rotation (orthonormal, determinant 1), got {R.tolist()}")
-        # the largest of 4 w^2, 4 x^2, 4 y^2, 4 z^2 loses no digits (Shepperd, 1978)
-        K = np.array(
-            [
-                [1 + R[0, 0] - R[1, 1] - R[2, 2], R[0, 1] + R[1, 0], R[0, 2] + R[2, 0], R[2, 1] - R[1, 2]],
-                [R[0, 1] + R[1, 0], 1 - R[0, 0] + R[1, 1] - R[2, 2], R[1, 2] + R[2, 1], R[0, 2] - R[2, 0]],
-                [R[0, 2] + R[2, 0], R[1, 2] + R[2, 1], 1 - R[0, 0] - R[1, 1] + R[2, 2], R[1, 0] - R[0, 1]],
-                [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], 1 + R[0, 0] + R[1, 1] + R[2, 2]],
-            ]
-        )
-        q = K[K.diagonal().argmax()]
-        return cls(position, q / np.linalg.norm(q))
+        rows = _matrix_rows(matrix)
+        if len(rows) == 4 and (last := rows.pop()) != [0.0, 0.0, 0.0, 1.0]:
+            raise PoseError(f"matrix: expected the last row 0 0 0 1, got {last}")
+        (a, b, c, *x), (d, e, f, *y), (g, h, i, *z) = rows
+        off = max(
+            abs(a * a + b * b + c * c - 1.0), abs(d * d + e * e + f * f - 1.0), abs(g * g + h * h + i * i - 1.0),
+            abs(a * d + b * e + c * f), abs(a * g + b * h + c * i), abs(d * g + e * h + f * i),
+        )  # fmt: skip
+        turned = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+        if not off <= UNIT_QUATERNION or not turned > 0.0:
+            R = [[a, b, c], [d, e, f], [g, h, i]]
+            raise PoseError(f"matrix: expected a rotation (orthonormal, determinant 1), got {R}")
+        # the largest of 4 x^2, 4 y^2, 4 z^2, 4 w^2 loses no digits (Shepperd, 1978)
+        squares = 1 + a - e - i, 1 - a + e - i, 1 - a - e + i, 1 + a + e + i
+        largest = max(squares)
+        if largest == squares[3]:
+            q = h - f, c - g, d - b, largest
+        elif largest == squares[0]:
+            q = largest, b + d, c + g, h - f
+        elif largest == squares[1]:
+            q = b + d, largest, f + h, c - g
+        else:
+            q = c + g, f + h, largest, d - b
+        length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+        return cls((*x, *y, *z) if x else (0.0, 0.0, 0.0), tuple([each / length for each in q]))
 
     @classmethod
     def from_euler(
@@ -190,31 +295,90 @@ class Pose:
         return Pose(self.position + self.rotation @ other.position, multiply(self.quaternion, other.quaternion))
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
+class Motion(Frozen):
     """A pose, its twist and its linear acceleration, in the world frame. Raises PoseError.
 
-    linear (m/s) and acceleration (m/s^2) refer to the body's origin; angular is in rad/s.
+    linear (m/s) and acceleration (m/s^2) refer to the body's origin; angular is in rad/s. The arrays (3,) are
+    read-only. The pose may be given as `as_pose` takes it.
 
     >>> Motion(Pose(), linear=(1, 0, 0), angular=(0, 0, 0.5)).at(2.0).position
     array([2., 0., 0.])
     """
 
     pose: Pose
-    linear: Any = (0.0, 0.0, 0.0)
-    angular: Any = (0.0, 0.0, 0.0)
-    acceleration: Any = (0.0, 0.0, 0.0)
+    numbers: tuple[float, ...]
+    linear: Array
+    angular: Array
+    acceleration: Array
 
-    def __post_init__(self) -> None:
-        if not isinstance(self.pose, Pose):
-            got = type(self.pose).__name__
-            raise PoseError(f"Motion: expected a Pose first, got {got}; write Motion(Pose((x, y, z)), linear)")
-        object.__setattr__(self, "linear", checked_vector(self.linear, "linear velocity"))
-        object.__setattr__(self, "angular", checked_vector(self.angular, "angular velocity"))
-        object.__setattr__(self, "acceleration", checked_vector(self.acceleration, "acceleration"))
+    def __init__(
+        self,
+        pose: Any,
+        linear: Any = (0.0, 0.0, 0.0),
+        angular: Any = (0.0, 0.0, 0.0),
+        acceleration: Any = (0.0, 0.0, 0.0),
+    ) -> None:
+        known = self.__dict__
+        known["pose"] = pose if type(pose) is Pose else as_pose(pose, "Motion, pose")
+        try:
+            known["numbers"] = (*_three(linear), *_three(angular), *_three(acceleration))
+        except _REFUSED:
+            named = {"linear velocity": linear, "angular velocity": angular, "acceleration": acceleration}
+            known["numbers"] = tuple(
+                number for name, value in named.items() for number in checked_vector(value, name).tolist()
+            )
+
+    def __getattr__(self, name: str) -> Any:
+        """Make an array when it is first read."""
+        if name not in _PLACE:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
+        value = np.array(self.numbers[_PLACE[name]])
+        value.setflags(write=False)
+        self.__dict__[name] = value
+        return value
+
+    def __repr__(self) -> str:
+        """Return the pose and what is not zero, for a person."""
+        parts = [repr(self.pose)]
+        for name, place in _PLACE.items():
+            if any(self.numbers[place]):
+                parts.append(f"{name}=({', '.join(f'{each:.6g}' for each in self.numbers[place])})")
+        return f"{type(self).__name__}({', '.join(parts)})"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles hold the numbers alone."""
+        linear, angular, acceleration = (self.numbers[place] for place in _PLACE.values())
+        return type(self), (self.pose, linear, angular, acceleration)
 
     def at(self, time: float) -> Pose:
         """The pose after `time` seconds at constant angular velocity and acceleration."""
         turn = from_rotation_vector(self.angular * time)
         moved = (self.linear + 0.5 * self.acceleration * time) * time
         return Pose(self.pose.position + moved, multiply(turn, self.pose.quaternion))
+
+
+_PLACE: Final = {"linear": slice(0, 3), "angular": slice(3, 6), "acceleration": slice(6, 9)}
+
+
+def as_pose(value: Any, name: str) -> Pose:
+    """Return a pose, also of a position (3,), of x y z qx qy qz qw (7,), or of a matrix (4, 4). Raises PoseError.
+
+    name: of the argument, for the error.
+    """
+    if isinstance(value, Pose):
+        return value
+    shape: tuple[int, ...] = ()
+    if isinstance(value, tuple | list | np.ndarray):
+        with contextlib.suppress(ValueError):  # rows of different lengths
+            shape = np.shape(value) if len(value) == 4 or isinstance(value, np.ndarray) else (len(value),)
+    try:
+        if shape == (3,):
+            return Pose(value)
+        if shape == (7,):
+            return Pose(value[:3], value[3:])
+        if shape == (4, 4):
+            return Pose.from_matrix(value)
+    except PoseError as error:
+        raise PoseError(f"{name}: {error}") from None
+    got = f"an array of shape {shape}" if shape else type(value).__name__
+    raise PoseError(f"{name}: expected a Pose, (x, y, z), 7 numbers x y z qx qy qz qw or a matrix (4, 4), got {got}")

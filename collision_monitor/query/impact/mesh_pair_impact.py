@@ -58,7 +58,7 @@ def mesh_impact_of_faces(
     if not have_kernels(kept_tree(shape_a), kept_tree(shape_b), NEVER):
         return None
     try:
-        states = motion_a.packed_motion, motion_b.packed_motion  # type: ignore[attr-defined]
+        states = motion_a.packed_motion, motion_b.packed_motion
     except AttributeError:
         states = packed_motion(motion_a), packed_motion(motion_b)
         if states[0] is None or states[1] is None:
@@ -83,7 +83,7 @@ def impact_in_hulls(
     """
     try:
         hulls = hull_a.packed_shape, hull_b.packed_shape  # type: ignore[attr-defined]
-        states = motion_a.packed_motion, motion_b.packed_motion  # type: ignore[attr-defined]
+        states = motion_a.packed_motion, motion_b.packed_motion
     except AttributeError:
         hulls, states = (packed_shape(hull_a), packed_shape(hull_b)), (packed_motion(motion_a), packed_motion(motion_b))
         if any(each is None for each in (*hulls, *states)):
