@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from collision_monitor._jit import kernel
-from collision_monitor.impact.mesh_pair import mesh_within
+from collision_monitor.impact.mesh_pair import SURFACES, mesh_within
 from collision_monitor.narrow_phase.pair_pose import PairPose
 
 
@@ -22,4 +22,5 @@ def mesh_contacts(table: Any, places: Any, R: Any, p: Any, limit: float, near: A
     for k in range(len(places)):
         x = p[0] - places[k, 0], p[1] - places[k, 1], p[2] - places[k, 2]
         if x[0] * x[0] + x[1] * x[1] + x[2] * x[2] <= reach * reach:
-            near[k] = mesh_within(table, np.int32(0), np.int32(1), PairPose(R[0], R[1], x), limit, out, scratch)
+            pose = PairPose(R[0], R[1], x)
+            near[k] = mesh_within(table, np.int32(0), np.int32(1), pose, limit, SURFACES, out, scratch)

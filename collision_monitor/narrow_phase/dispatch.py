@@ -156,7 +156,7 @@ def _separation(table: Any, a: int, b: int, pose: PairPose, accuracy: Accuracy, 
 
 @inlined
 def contact_within(table: Any, a: int, b: int, pose: PairPose, limit: float, out: Any, work: Any) -> bool:
-    """Whether the signed distance is at most `limit` (m); only then `out` holds the contact (see contact_row.py).
+    """Whether the signed distance may be at most `limit` (m) within its error bound; only then `out` holds the contact.
 
     Most pairs of a broad phase are apart, so a test stops as soon as that is certain.
     """
@@ -165,7 +165,7 @@ def contact_within(table: Any, a: int, b: int, pose: PairPose, limit: float, out
     if is_swapped:
         a, b = b, a
         pose = swapped(pose)
-    if not (_contact(table, a, b, pose, limit, out, work) and out[DISTANCE] <= limit):
+    if not (_contact(table, a, b, pose, limit, out, work) and out[DISTANCE] - out[BOUND] <= limit):
         return False
     if is_swapped:
         mirror(out, p)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import operator
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,9 +11,6 @@ import numpy as np
 from collision_monitor.errors import InputError, PoseError
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Shape
-
-Compound = Shape | Sequence[tuple[Shape, Pose]]
-"""A shape, or several with their poses in the object's frame."""
 
 
 def finite_number(name: str, value: Any, positive: bool = False) -> float:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import InputError, PoseError, ShapeError
-from collision_monitor.query.arguments import Compound
 from collision_monitor.query.packed import packed_shape
+from collision_monitor.shapes.compound import Compound
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Shape
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.errors import PoseError
 from collision_monitor.objects.models import containing_kdop, containing_model, parse_model
-from collision_monitor.query.arguments import Compound, checked_pose
+from collision_monitor.query.arguments import checked_pose
 from collision_monitor.query.piece_table import PieceTable, exact_piece_table, piece_table
 from collision_monitor.records import Model
-from collision_monitor.shapes.compound import shape_pairs
+from collision_monitor.shapes.compound import Compound, shape_pairs
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Mesh, Points, Shape

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,6 +10,9 @@ import numpy as np
 from collision_monitor.errors import ShapeError
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Shape
+
+Compound = Shape | Sequence[tuple[Shape, Pose]]
+"""A shape, or several with their poses in the object's frame."""
 
 
 def shape_pairs(value: Any, what: str) -> tuple[tuple[Shape, Pose], ...]:

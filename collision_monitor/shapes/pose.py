@@ -382,3 +382,10 @@ def as_pose(value: Any, name: str) -> Pose:
         raise PoseError(f"{name}: {error}") from None
     got = f"an array of shape {shape}" if shape else type(value).__name__
     raise PoseError(f"{name}: expected a Pose, (x, y, z), 7 numbers x y z qx qy qz qw or a matrix (4, 4), got {got}")
+
+
+def as_motion(value: Any, name: str) -> Motion:
+    """Return a motion. Raises PoseError for anything else; name: of the argument, for the error."""
+    if isinstance(value, Motion):
+        return value
+    raise PoseError(f"{name}: expected a Motion, got {type(value).__name__}; write Motion(pose)")

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collision_monitor.query.arguments import Compound
 from collision_monitor.query.contact.contact import contact
 from collision_monitor.query.contact.convex_pairs import packed_contact
+from collision_monitor.shapes.compound import Compound
 from collision_monitor.shapes.pose import Pose
 
 

@@ -11,11 +11,11 @@ from collision_monitor.geometry.lecture.cascade import polyhedra_intersect
 from collision_monitor.geometry.lecture.polygon_overlap import Evidence, polygons_intersect, sat_2d
 from collision_monitor.geometry.lecture.polyhedron_sat import sat_3d
 from collision_monitor.geometry.triangulation import convex_parts
-from collision_monitor.query.arguments import Compound, checked_pose
+from collision_monitor.query.arguments import checked_pose
 from collision_monitor.query.contact.contact import contact
 from collision_monitor.query.contact.convex_pairs import packed_contact
 from collision_monitor.query.contact.mesh_pairs import mesh_overlap
-from collision_monitor.shapes.compound import shape_pairs
+from collision_monitor.shapes.compound import Compound, shape_pairs
 from collision_monitor.shapes.planar import flat_pose
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Box, ConvexHull, Mesh, Polygon, Shape

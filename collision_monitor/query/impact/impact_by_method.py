@@ -9,12 +9,12 @@ from typing import Final
 import numpy as np
 
 from collision_monitor.errors import InputError, UnsupportedError
-from collision_monitor.query.arguments import Compound
 from collision_monitor.query.contact.contact import contact
 from collision_monitor.query.impact.impact import Impact
 from collision_monitor.query.impact.impact_methods import METHODS, bisection, end_of_step, swept_bounds
 from collision_monitor.query.impact.moving_pair import MotionQuery, lay_out_pair, make_moving_shape
 from collision_monitor.records import Method
+from collision_monitor.shapes.compound import Compound
 from collision_monitor.shapes.pose import Motion
 from collision_monitor.shapes.registry import HalfSpace
 from collision_monitor.tolerances import GJK_TOUCHING

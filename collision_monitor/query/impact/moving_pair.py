@@ -18,9 +18,8 @@ from collision_monitor.motion.bodies import BodyTable, Multibody, make_bodies, m
 from collision_monitor.motion.body_layout import lay_out_body
 from collision_monitor.objects.excess import PosedShapes
 from collision_monitor.objects.models import containing_model, exact_model
-from collision_monitor.query.arguments import Compound
 from collision_monitor.query.contact.surface_pair import points_near
-from collision_monitor.shapes.compound import shape_pairs
+from collision_monitor.shapes.compound import Compound, shape_pairs
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
 from collision_monitor.shapes.forest import Forest
 from collision_monitor.shapes.planar import flat_pose, is_planar

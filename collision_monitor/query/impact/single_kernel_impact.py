@@ -7,13 +7,13 @@ from math import dist, inf
 from typing import Final
 
 from collision_monitor.meshes.trees.shape_trees import NEVER, have_kernels, kept_tree
-from collision_monitor.query.arguments import Compound
 from collision_monitor.query.contact.convex_pairs import convex_impact, packed_contact
 from collision_monitor.query.contact.fillings import filled_box, filled_mesh
 from collision_monitor.query.contact.mesh_pairs import boxes_apart
 from collision_monitor.query.contact.open_gap import may_be_inside
 from collision_monitor.query.impact.mesh_pair_impact import first_mesh_impact, impact_in_hulls, mesh_impact_of_faces
 from collision_monitor.query.impact.moving_pair import MotionQuery
+from collision_monitor.shapes.compound import Compound
 from collision_monitor.shapes.pose import Motion, Pose
 from collision_monitor.shapes.registry import Mesh, Shape
 from collision_monitor.tolerances import GJK_TOUCHING

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from collision_monitor.errors import InputError, PoseError
 from collision_monitor.impact.body_impact import ImpactQuery, make_scratch
 from collision_monitor.impact.impact_record import IMPACT
-from collision_monitor.query.arguments import Compound
 from collision_monitor.query.batch_result import BatchResult, Pairs
 from collision_monitor.query.impact.impact import Impact, impact_of_times
 from collision_monitor.query.impact.impact_rows import (
@@ -30,6 +29,7 @@ from collision_monitor.query.impact.moving_pair import (
 )
 from collision_monitor.query.impact.time_of_impact import check_bounded, check_query, time_of_impact
 from collision_monitor.query.pair_arrays import PackedShapes
+from collision_monitor.shapes.compound import Compound
 from collision_monitor.shapes.planar import is_planar
 from collision_monitor.shapes.pose import Motion, Pose
 from collision_monitor.shapes.registry import HalfSpace, Mesh, Points

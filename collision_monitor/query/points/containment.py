@@ -7,8 +7,8 @@ from numpy.typing import ArrayLike
 
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.coordinates import Booleans, coordinates
-from collision_monitor.query.arguments import Compound, checked_pose
-from collision_monitor.shapes.compound import shape_pairs
+from collision_monitor.query.arguments import checked_pose
+from collision_monitor.shapes.compound import Compound, shape_pairs
 from collision_monitor.shapes.containment import TESTS, inside
 from collision_monitor.shapes.planar import flat_pose, is_planar
 from collision_monitor.shapes.pose import Pose

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from collision_monitor.errors import PoseError, ShapeError, UnsupportedError
 from collision_monitor.objects.models import exact_model
-from collision_monitor.query.arguments import Compound, finite_number
+from collision_monitor.query.arguments import finite_number
 from collision_monitor.query.contact.surface_pair import points_near
-from collision_monitor.shapes.compound import shape_pairs
+from collision_monitor.shapes.compound import Compound, shape_pairs
 from collision_monitor.shapes.planar import is_planar
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Points

@@ -1,0 +1,216 @@
+"""First impacts of moving objects of the library, in one call of a kernel: `chains_impact`, as the monitor's."""
+
+from __future__ import annotations
+
+import threading
+from math import inf, isfinite, sqrt
+from typing import Any, Final
+
+import numpy as np
+
+from collision_monitor._jit import device, inlined, kernel
+from collision_monitor._jit.settled import settled
+from collision_monitor.impact.body_contact import RESULT, chains_contact
+from collision_monitor.impact.body_impact import (
+    Bodies,
+    ImpactQuery,
+    Scratch,
+    ShapePair,
+    Tube,
+    Window,
+    chains_impact,
+    first_overlap,
+    make_scratch,
+    shape_impact,
+)
+from collision_monitor.impact.impact_record import CLEAR, HIT, IMPACT
+from collision_monitor.impact.mesh_pair import SURFACES
+from collision_monitor.impact.overlap_time import overlap_time
+from collision_monitor.impact.touching_impact import DEEPENS, RESTS, touching_impact
+from collision_monitor.meshes.distance.nearest import PLACE_A, PLACE_B
+from collision_monitor.motion.bodies import Parts, next_pair
+from collision_monitor.motion.motion import MOTION, quaternion_to_matrix
+from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.query.library import LIBRARY
+from collision_monitor.shapes.pose import Motion
+from collision_monitor.shapes.registry import BALL
+from collision_monitor.shapes.shape_table import ShapeTable
+from collision_monitor.tolerances import GJK_TOUCHING
+
+DECIDED, TOUCHES = range(2)
+"""What a kernel says of its times: they are final; or the objects touch at the start and have to be followed."""
+
+STILL: Final = Tube(0.0, 0.0)
+"""A query knows the motions exactly."""
+
+
+class ImpactMemory(threading.local):
+    """Two motions, the found impact, a contact row and scratch memory of each thread, one array after the other."""
+
+    def __init__(self) -> None:
+        self.arrays = (*make_scratch(), np.zeros(2, MOTION), np.zeros(1, IMPACT), np.zeros(RESULT))
+
+
+MEMORY: Final = ImpactMemory()
+
+
+@inlined
+def _set_chain(table: Any, parts: Any, first: int, motion: Any, horizon: float) -> float:
+    """Set the radius of a motion to that of a chain about its origin; return its spin radius (m)."""
+    s, radius = first, 0.0
+    while s >= 0:
+        x, y, z = table.local_position[s, 0], table.local_position[s, 1], table.local_position[s, 2]
+        radius = max(radius, sqrt(x * x + y * y + z * z) + table.radius[s])
+        s = parts.next[s]
+    motion.radius, motion.cover = radius, horizon
+    is_ball = parts.next[first] < 0 and not parts.placed[first] and BALL[table.kind[first]]
+    return 0.0 if is_ball else radius
+
+
+@inlined
+def _round_off(A: Any, B: Any) -> float:
+    """Depth (m) of two objects up to which they only touch."""
+    size = (A.radius if isfinite(A.radius) else 0.0) + (B.radius if isfinite(B.radius) else 0.0)
+    return GJK_TOUCHING * size
+
+
+@device
+def _first_impact(table: Any, parts: Any, chains: Any, window: Any, search: Any, scratch: Any, moving: Any) -> Any:
+    """First impact of two chains (first slots) in a window: lower, upper (s), infinite for none, and a code."""
+    motion, event, row = moving
+    A, B = motion[0], motion[1]
+    spin_a = _set_chain(table, parts, chains[0], A, window.end)
+    spin_b = _set_chain(table, parts, chains[1], B, window.end)
+    if window.begin == 0.0:
+        p = B.x - A.x, B.y - A.y, B.z - A.z
+        reach, wanted = A.radius + B.radius + search.margin, search.margin - _round_off(A, B)
+        if p[0] * p[0] + p[1] * p[1] + p[2] * p[2] <= reach * reach:
+            pose = PairPose(A.rotation, B.rotation, p)
+            start, _ = chains_contact(table, parts, chains[0], chains[1], pose, wanted, SURFACES, scratch, row)
+            if start < wanted:
+                return 0.0, 0.0, DECIDED
+    pair = Bodies(A, B, chains[0], chains[1], spin_a, spin_b)
+    chains_impact(table, parts, pair, window, search, scratch, event[0])
+    if event[0].status == CLEAR:
+        return inf, inf, DECIDED
+    upper = event[0].upper if event[0].status == HIT and event[0].upper <= window.end else inf
+    return event[0].lower, upper, TOUCHES if event[0].lower <= 0.0 else DECIDED
+
+
+@inlined
+def _set_motion(m: Any, numbers: Any, k: int) -> None:
+    """Set a motion (MOTION) to numbers[k]: pose (7), linear, angular, acceleration (3 each)."""
+    m.x, m.y, m.z = numbers[k, 0], numbers[k, 1], numbers[k, 2]
+    m.vx, m.vy, m.vz = numbers[k, 7], numbers[k, 8], numbers[k, 9]
+    m.wx, m.wy, m.wz = numbers[k, 10], numbers[k, 11], numbers[k, 12]
+    m.ax, m.ay, m.az = numbers[k, 13], numbers[k, 14], numbers[k, 15]
+    quaternion_to_matrix(numbers[:, 3:7], k, m.rotation)
+
+
+@settled
+@kernel
+def impact_of_chains(
+    kind, size, margin, radius, vertex_start, vertex_count, vertices, vertex_index, local_position, local_rotation,
+    blocks, next_part, index, placed, rotation, quaternion, out, work, tree, answer, triangle, motion, event, row,
+    a, ax, ay, az, ai, aj, ak, aw, avx, avy, avz, awx, awy, awz, aax, aay, aaz,
+    b, bx, by, bz, bi, bj, bk, bw, bvx, bvy, bvz, bwx, bwy, bwz, bax, bay, baz,
+    horizon, tolerance, separation, iterations, begin,
+):  # fmt: skip
+    """First impact of two moving chains of slots: lower, upper (s), infinite for none; DECIDED or TOUCHES.
+
+    A motion is a pose, a linear and an angular velocity and an acceleration, in the world. begin: time (s) before which
+    there is none.
+    """
+    table = ShapeTable(
+        kind, size, margin, radius, vertex_start, vertex_count, vertices, vertex_index, local_position, local_rotation,
+        blocks,
+    )  # fmt: skip
+    parts, scratch = Parts(next_part, index, placed), Scratch(rotation, quaternion, out, work, tree, answer, triangle)
+    A, B = motion[0], motion[1]
+    A.x, A.y, A.z, A.vx, A.vy, A.vz, A.wx, A.wy, A.wz = ax, ay, az, avx, avy, avz, awx, awy, awz
+    B.x, B.y, B.z, B.vx, B.vy, B.vz, B.wx, B.wy, B.wz = bx, by, bz, bvx, bvy, bvz, bwx, bwy, bwz
+    A.ax, A.ay, A.az, B.ax, B.ay, B.az = aax, aay, aaz, bax, bay, baz
+    quaternion[0, 0], quaternion[0, 1], quaternion[0, 2], quaternion[0, 3] = ai, aj, ak, aw
+    quaternion_to_matrix(quaternion, 0, A.rotation)
+    quaternion[0, 0], quaternion[0, 1], quaternion[0, 2], quaternion[0, 3] = bi, bj, bk, bw
+    quaternion_to_matrix(quaternion, 0, B.rotation)
+    search, chains = ImpactQuery(separation, tolerance, iterations), (np.int32(a), np.int32(b))
+    return _first_impact(table, parts, chains, Window(begin, horizon), search, scratch, (motion, event, row))
+
+
+@kernel
+def impacts_of_chains(table, parts, scratch, moving, firsts_a, motions_a, firsts_b, motions_b, query, rows):
+    """Write lower, upper (s) and code of N pairs to rows (N, 3). firsts (N,) or (1,): slots; motions (N, 16) or (1, 16).
+
+    query (4,): horizon, tolerance, separation, iterations. moving: motions, event and row, as for one pair.
+    """
+    search, window = ImpactQuery(query[2], query[1], int(query[3])), Window(0.0, query[0])
+    for k in range(len(rows)):
+        _set_motion(moving[0][0], motions_a, min(k, len(motions_a) - 1))
+        _set_motion(moving[0][1], motions_b, min(k, len(motions_b) - 1))
+        chains = firsts_a[min(k, len(firsts_a) - 1)], firsts_b[min(k, len(firsts_b) - 1)]
+        rows[k, 0], rows[k, 1], rows[k, 2] = _first_impact(table, parts, chains, window, search, scratch, moving)
+
+
+@kernel
+def touching_chains(table, parts, scratch, motion, slots_a, slots_b, query):
+    """First impact of all pairs of slots of two objects that touch at the start: lower, upper (s), infinite for none.
+
+    motion (2,): of `impact_of_chains`, which has been called for the same motions. query: as above.
+    """
+    horizon, tolerance, separation = query[0], query[1], query[2]
+    A, B = motion[0], motion[1]
+    skin = 2.0 * _round_off(A, B)
+    search = ImpactQuery(separation, tolerance, int(query[3]))
+    deeper = ImpactQuery(separation - skin, tolerance, int(query[3]))
+    lower = upper = inf
+    for a in slots_a:
+        for b in slots_b:
+            pair, window, wanted = ShapePair(A, B, a, b), Window(0.0, min(horizon, lower)), search
+            scratch.answer[PLACE_A] = -1.0
+            status, t, _, guess = shape_impact(table, parts, pair, window, STILL, search, scratch)
+            if status == CLEAR:
+                continue
+            if t <= 0.0:
+                what, t = touching_impact(table, parts, pair, window, skin, 2.0 * tolerance, separation, scratch)
+                if what == RESTS:
+                    continue
+                if what == DEEPENS:
+                    wanted, guess = deeper, 0.0
+                else:
+                    status, t, _, guess = shape_impact(
+                        table, parts, pair, Window(t, window.end), STILL, search, scratch
+                    )
+                    if status == CLEAR:
+                        continue
+            lower = min(lower, t)
+            places = (int(scratch.answer[PLACE_A]), int(scratch.answer[PLACE_B])) if wanted == search else (-1, -1)
+            near = status, t, guess, places
+            sure, _ = first_overlap(table, parts, pair, near, Window(0.0, horizon), STILL, wanted, scratch)
+            upper = min(upper, sure)
+    return lower, upper if upper <= horizon else inf
+
+
+@kernel
+def overlap_of_chains(table, parts, scratch, motion, a, b, query):
+    """Least `overlap_time` (s) within the horizon of the pairs of two chains; infinite: none found. motion: as above.
+
+    Only for meshes; it finds overlaps where no triangles cross because they lie in one plane.
+    """
+    A, B = motion[0], motion[1]
+    deeper = ImpactQuery(query[2] - 2.0 * _round_off(A, B), query[1], int(query[3]))
+    window, first_b, best = Window(0.0, query[0]), b, inf
+    while a >= 0:
+        pair = ShapePair(A, B, a, b)
+        best = overlap_time(table, parts, pair, (0.0, best), window, STILL, deeper, scratch)
+        a, b = next_pair(parts, first_b, a, b)
+    return best
+
+
+def first_impact(a: int, motion_a: Motion, b: int, motion_b: Motion, query: Any, begin: float = 0.0) -> tuple[float, float, int]:
+    """Lower, upper (s) and code of two chains of the library. query: horizon, tolerance, separation, iterations."""
+    found: tuple[float, float, int] = impact_of_chains.entry(
+        *LIBRARY.arrays, *MEMORY.arrays, a, *motion_a.pose.numbers, *motion_a.numbers,
+        b, *motion_b.pose.numbers, *motion_b.numbers, *query, begin,
+    )  # fmt: skip
+    return found
