@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from collision_monitor.query.impact.moving_pair import make_moving_shape
 from numpy.typing import NDArray
 
 import collision_monitor as cm
@@ -30,7 +31,6 @@ from collision_monitor._jit import kernel
 from collision_monitor.impact.body_impact import ShapePair, contact_at, make_scratch
 from collision_monitor.motion.motion import relative_position
 from collision_monitor.query.impact.impact_methods import lay_out_motions
-from collision_monitor.query.impact.moving_pair import make_moving_shape
 
 Array = NDArray[np.float64]
 Shape = cm.Sphere | cm.Box | cm.Capsule | cm.Cylinder | cm.Cone | cm.ConvexHull | cm.HalfSpace

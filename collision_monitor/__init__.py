@@ -118,8 +118,8 @@ if TYPE_CHECKING:
     from collision_monitor.query.impact.feature_impact import vertex_face_impact as vertex_face_impact
     from collision_monitor.query.impact.impact import Impact as Impact
     from collision_monitor.query.impact.time_of_impact import time_of_impact as time_of_impact
-    from collision_monitor.query.impact.time_of_impact_batch import Impacts as Impacts
-    from collision_monitor.query.impact.time_of_impact_batch import time_of_impact_batch as time_of_impact_batch
+    from collision_monitor.query.impact.times_of_impact import Impacts as Impacts
+    from collision_monitor.query.impact.times_of_impact import time_of_impact_batch as time_of_impact_batch
     from collision_monitor.query.impact.times_of_impact import times_of_impact as times_of_impact
     from collision_monitor.query.points.containment import contains as contains
     from collision_monitor.query.points.kdop import Enclosure as Enclosure

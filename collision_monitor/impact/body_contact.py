@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.impact.body_impact import CLOSING, closing_speed
-from collision_monitor.impact.mesh_pair import SURFACES, shapes_within
+from collision_monitor.impact.mesh_pair import SURFACES, shapes_overlap, shapes_within
 from collision_monitor.motion.bodies import next_pair, place_shape
 from collision_monitor.motion.motion import (
     age_of,
@@ -117,6 +117,22 @@ def chains_contact(table, parts, first_a, first_b, pose, limit, effort, scratch,
             result[SHAPE_I], result[SHAPE_J] = a, b
         a, b = next_pair(parts, first_b, a, b)
     return best, tests
+
+
+@device
+def chains_overlap(table, parts, first_a, first_b, pose, scratch):
+    """Whether two chains have a point in common. Arguments as for `chains_contact`."""
+    R_a, R_b, p = scratch.rotation[2], scratch.rotation[3], pose.p
+    a, b, oa = first_a, first_b, (0.0, 0.0, 0.0)
+    while a >= 0:
+        if b == first_b:
+            oa = place_shape(table, parts, a, pose.R_A, R_a)
+        ob = place_shape(table, parts, b, pose.R_B, R_b)
+        at = PairPose(R_a, R_b, (p[0] + ob[0] - oa[0], p[1] + ob[1] - oa[1], p[2] + ob[2] - oa[2]))
+        if shapes_overlap(table, a, b, at, scratch):
+            return True
+        a, b = next_pair(parts, first_b, a, b)
+    return False
 
 
 @outlined

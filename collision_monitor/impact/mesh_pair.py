@@ -40,9 +40,9 @@ from collision_monitor.shapes.kinds.points import POINTS
 from collision_monitor.shapes.shape_table import TREE
 from collision_monitor.tolerances import FEATURE_TIE, SAT_ROUND_OFF
 
-OVERLAP, SURFACES, SOLIDS = range(3)
-"""What a search of a pair with a mesh has to tell of an overlap: that there is one; how deep the surfaces are in each
-other; or how deep the triangles are in the other solid, if that is convex, which is deeper and takes longer."""
+SURFACES, SOLIDS = range(2)
+"""What a search of a pair with a mesh has to tell of an overlap: how deep the surfaces are in each other; or how deep
+the triangles are in the other solid, if that is convex, which is deeper and takes longer."""
 
 
 @inlined
@@ -115,11 +115,9 @@ def mesh_within(table, a, b, pose, limit, effort, out, scratch):
     """Whether the distance of two shapes with trees, or of one and a solid, is at most `limit` (m); writes the contact.
 
     If they overlap, the depth is that of the deepest pair of triangles or points; a translation that parts them may be
-    longer. effort: OVERLAP, for which the contact need not be written; SURFACES; or SOLIDS.
+    longer. effort: SURFACES or SOLIDS.
     """
     if have_trees(table, a, b):
-        if effort == OVERLAP:
-            return _trees_overlap(table, a, b, pose, scratch.tree)
         found, known = _trees_within(table, a, b, pose, limit, out, scratch)
         if effort != SOLIDS or known == FARTHER or known == APART or is_polytope(table, a) == is_polytope(table, b):
             return found
@@ -130,16 +128,6 @@ def mesh_within(table, a, b, pose, limit, effort, out, scratch):
 def is_polytope(table, s):
     """Whether a shape is a convex polytope."""
     return table.kind[s] == BOX or table.kind[s] == CONVEX_HULL
-
-
-@device
-def _trees_overlap(table, a, b, pose, work):
-    """Whether two trees have a point in common, on a surface or in a solid, or may have one if it takes too long."""
-    X, margins = relative(pose.R_A, pose.R_B, pose.p), table.margin[a] + table.margin[b]
-    blocks, first, second = table.blocks, root_of(table, a), root_of(table, b)
-    if margins > 0.0 or not touching_triangles(blocks, first, blocks, second, X, 1, work)[1]:
-        return True
-    return is_either_in(blocks, first, blocks, second, X, 0.0, work) != OUTSIDE
 
 
 @device
@@ -241,3 +229,15 @@ def shapes_within(table, a, b, pose, limit, effort, out, scratch):
     if has_mesh(table, a, b):
         return mesh_within(table, a, b, pose, limit, effort, out, scratch)
     return contact_within(table, a, b, pose, limit, out, scratch.work)
+
+
+@device
+def shapes_overlap(table, a, b, pose, scratch):
+    """Whether two shapes have a point in common, of an open mesh on its surface; meshes whose test is too long may."""
+    if has_mesh(table, a, b) and have_trees(table, a, b) and table.margin[a] + table.margin[b] == 0.0:
+        X, blocks, work = relative(pose.R_A, pose.R_B, pose.p), table.blocks, scratch.tree
+        first, second = root_of(table, a), root_of(table, b)
+        if not touching_triangles(blocks, first, blocks, second, X, 1, work)[1]:
+            return True
+        return is_either_in(blocks, first, blocks, second, X, 0.0, work) != OUTSIDE
+    return shapes_within(table, a, b, pose, 0.0, SURFACES, scratch.out, scratch) and scratch.out[DISTANCE] <= 0.0

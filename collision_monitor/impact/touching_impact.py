@@ -1,8 +1,8 @@
 """First impact of two shapes that touch at the start: they part, slide, roll or rest, or they go into each other.
 
-Touching is no impact as long as one direction keeps the shapes from being deeper in each other than round-off. Along it,
-the gap is that of their support functions, and the advance is that of every impact (advance.py). So a box that slides on
-a floor is followed to the horizon in one step.
+Touching is no impact as long as one direction keeps the shapes from being deeper in each other than round-off. Along
+it, the gap is that of their support functions, and the advance is that of every impact (advance.py). So a box that
+slides on a floor is followed to the horizon in one step.
 """
 
 from __future__ import annotations

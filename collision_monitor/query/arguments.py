@@ -6,11 +6,7 @@ import math
 import operator
 from typing import Any
 
-import numpy as np
-
-from collision_monitor.errors import InputError, PoseError
-from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.registry import Shape
+from collision_monitor.errors import InputError
 
 
 def finite_number(name: str, value: Any, positive: bool = False) -> float:
@@ -34,25 +30,3 @@ def whole_number(name: str, value: Any) -> int:
     if result < 1:
         raise InputError(f"{name}: expected a whole number from 1, got {value!r}")
     return min(result, 2**31)
-
-
-def checked_pose(pose: Any, name: str) -> Pose:
-    """Return the pose. Raises PoseError for anything else, with what to write instead."""
-    if isinstance(pose, Pose):
-        return pose
-    if isinstance(pose, Shape):
-        hint = "each shape is followed by its pose: shape_a, pose_a, shape_b, pose_b"
-    elif (shape := _shape_of(pose)) in ((4, 4), (3, 3)):
-        hint = "write Pose.from_matrix(matrix)"
-    elif shape == (7,):
-        hint = "write Pose((x, y, z), (qx, qy, qz, qw))"
-    else:
-        hint = "write Pose((x, y, z))"
-    raise PoseError(f"{name}: expected a Pose, got {type(pose).__name__}; {hint}")
-
-
-def _shape_of(value: Any) -> tuple[int, ...]:
-    try:
-        return np.shape(value)
-    except ValueError:  # rows of different lengths
-        return ()

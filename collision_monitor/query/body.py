@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Final
+from typing import Final
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from collision_monitor.errors import PoseError
 from collision_monitor.geometry.bounded_cache import bounded_cache
@@ -37,13 +36,14 @@ _HERE: Final = Pose()
 class KeptSlots:
     """What a shape keeps of its layout, as its attribute `kept_slots`.
 
-    pieces: None for the shape itself. inside: CERTAIN or NEVER if the kernel's answer of a distance needs no completion.
+    pieces: None for the shape itself. inside: CERTAIN or NEVER if a kernel's answer of a distance needs no completion.
     """
 
-    __slots__ = ("first", "has_mesh", "inside", "is_convex", "is_planted", "pieces", "slots")
+    __slots__ = ("first", "has_mesh", "inside", "is_bounded", "is_convex", "is_planted", "pieces", "slots")
 
     def __init__(self, shape: Shape) -> None:
-        is_simple = kind_of(shape).packed
+        kind = kind_of(shape)
+        is_simple, self.is_bounded = not (kind.planar or isinstance(shape, Mesh | Points)), kind.bounded
         found = ((shape, _HERE),) if is_simple else tuple(exact_model(((shape, _HERE),)).pieces)
         self.slots = laid_out(found)
         self.first = self.slots.first

@@ -36,7 +36,7 @@ class Slots:
 class Library:
     """Slots for shapes. Safe in several threads: a kernel reads the arrays of its call, to which others only add.
 
-    arrays: those of the ShapeTable and of Parts, one after the other, as the kernels of queries take them.
+    tuples: the ShapeTable and Parts. arrays: theirs, one after the other, as the kernels of single queries take them.
     """
 
     def __init__(self) -> None:
@@ -44,6 +44,10 @@ class Library:
         self._builder = ShapeTableBuilder(FIRST_CAPACITY)
         self._parts = make_parts(FIRST_CAPACITY)
         self._freed: deque[list[int]] = deque()
+        self._show()
+
+    def _show(self) -> None:
+        self.tuples = self._builder.table, self._parts
         self.arrays: tuple[Any, ...] = (*self._builder.table, *self._parts)
 
     def lay_out(self, pieces: Sequence[tuple[Shape, Pose | None]]) -> Slots:
@@ -70,7 +74,7 @@ class Library:
                 self._parts = larger
             for slot, after, (_, pose) in zip(numbers, [*numbers[1:], -1], pieces, strict=True):
                 self._parts.next[slot], self._parts.placed[slot] = after, pose is not None
-            self.arrays = (*self._builder.table, *self._parts)
+            self._show()
             return Slots(numbers, self._freed)
 
     def plant(self, pieces: Sequence[tuple[Shape, Pose | None]], slots: Slots) -> None:
@@ -80,7 +84,7 @@ class Library:
             with self._lock:
                 if tree is not None and self._builder.table.size[slot, TREE] == 0.0:
                     self._builder.plant(slot, tree)
-                    self.arrays = (*self._builder.table, *self._parts)
+                    self._show()
 
 
 LIBRARY: Final = Library()

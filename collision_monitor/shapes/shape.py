@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,10 @@ Array = NDArray[np.float64]
 @dataclass(frozen=True, eq=False)
 class Shape:
     """Base class of all shapes. Shapes with arrays compare by identity, the others by their sizes."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Copies and pickles hold the fields alone, not what later calls keep on the shape."""
+        return {each.name: self.__dict__[each.name] for each in fields(self)}
 
 
 def array_bytes(shape: Shape) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import inf
 from typing import Final
 
@@ -85,9 +84,7 @@ def least_gap(a: QueryBody, pose_a: Pose, b: QueryBody, pose_b: Pose) -> float:
     )
 
 
-def _gap(
-    shapes_a: PosedShapes, pose_a: Pose, shapes_b: Sequence[tuple[object, Pose]] | PosedShapes, pose_b: Pose
-) -> float:
+def _gap(shapes_a: PosedShapes, pose_a: Pose, shapes_b: PosedShapes, pose_b: Pose) -> float:
     if not len(shapes_a) or not len(shapes_b):
         return inf
     a, b = laid_out(shapes_a), laid_out(shapes_b)

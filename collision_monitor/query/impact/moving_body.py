@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from collision_monitor.errors import TooCostlyError, UnsupportedError
 from collision_monitor.objects.models import containing_model
 from collision_monitor.query.body import PosedShapes, QueryBody, check_in_plane, exact_body
-from collision_monitor.query.points.points_within import points_near
+from collision_monitor.query.points.near_points import near_points
 from collision_monitor.shapes.compound import Compound
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
 from collision_monitor.shapes.planar import flat_pose
@@ -82,7 +82,7 @@ def touching_pieces(moving: MovingBody, other: MovingBody, near: float) -> Posed
 
 def _near_points(cloud: Points, pose: Pose, other: MovingBody, near: float) -> Sequence[tuple[Shape, Pose]]:
     """Each point near the other object as a ball, and the cloud of the remaining ones."""
-    is_near: NDArray[np.bool_] = points_near(cloud, pose, other.body, other.motion.pose, near)
+    is_near: NDArray[np.bool_] = near_points(cloud, pose, other.body, other.motion.pose, near)
     if np.count_nonzero(is_near) > MOST_NEAR:
         raise TooCostlyError(f"expected at most {MOST_NEAR} points that touch, got {np.count_nonzero(is_near)}")
     balls: list[tuple[Shape, Pose]] = [

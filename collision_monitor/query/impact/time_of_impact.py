@@ -8,17 +8,24 @@ from typing import Any, Final
 import numpy as np
 
 from collision_monitor.errors import TooCostlyError
+from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.impact.mesh_pair import SURFACES
 from collision_monitor.meshes.trees.shape_trees import CERTAIN
 from collision_monitor.query.arguments import finite_number
-from collision_monitor.query.body import PosedShapes, QueryBody, kept_slots, laid_out
+from collision_monitor.query.body import KeptSlots, PosedShapes, QueryBody, kept_slots, laid_out
 from collision_monitor.query.contact.contact import check_kinds, contact, plant_bodies, plant_for_meshes
 from collision_monitor.query.contact.contact_kernel import contact_row
 from collision_monitor.query.contact.fillings import fillings
-from collision_monitor.query.contact.open_gap import INSIDE, least_gap, location_of
+from collision_monitor.query.contact.open_gap import least_gap, location_of
 from collision_monitor.query.impact.impact import CLEAR_IMPACT, Impact, impact_of_times, timed_impact
 from collision_monitor.query.impact.impact_by_method import impact_by_method
-from collision_monitor.query.impact.impact_kernel import DECIDED, TOUCHES, first_impact, overlap_time, touching_impact
+from collision_monitor.query.impact.impact_kernel import (
+    DECIDED,
+    TOUCHES,
+    first_certain_overlap,
+    first_impact,
+    first_impact_of_touching,
+)
 from collision_monitor.query.impact.impact_query import ITERATIONS, MotionQuery, check_query
 from collision_monitor.query.impact.moving_body import MovingBody, check_bounded, moving_body, touching_pieces
 from collision_monitor.records import Method
@@ -67,7 +74,7 @@ def time_of_impact(
         return impact_by_method(shape_a, motion_a, shape_b, motion_b, query, method, duration)
     motion_a, motion_b = as_motion(motion_a, "motion A"), as_motion(motion_b, "motion B")
     kept_a, kept_b = kept_slots(shape_a), kept_slots(shape_b)
-    if kept_a is not None and kept_b is not None and kept_a.inside == kept_b.inside == CERTAIN:
+    if kept_a is not None and kept_b is not None and _is_answered(kept_a, motion_a, kept_b, motion_b):
         plant_for_meshes(kept_a, shape_a, kept_b, shape_b)
         lower, upper, code = first_impact(kept_a.first, motion_a, kept_b.first, motion_b, query)
         if code == DECIDED:
@@ -77,6 +84,12 @@ def time_of_impact(
     check_kinds(a.body, a.motion.pose, b.body, b.motion.pose)
     plant_bodies(a.body, b.body)
     return _first_impact(a, b, query, (shape_a, motion_a, shape_b, motion_b))
+
+
+def _is_answered(a: KeptSlots, motion_a: Motion, b: KeptSlots, motion_b: Motion) -> bool:
+    """Whether the kernel's answer is the whole one: no open mesh, and no half-space that turns or meets another one."""
+    are_bounded = a.is_bounded or (b.is_bounded and not motion_a.angular.any())
+    return a.inside == b.inside == CERTAIN and are_bounded and (b.is_bounded or not motion_b.angular.any())
 
 
 def _first_impact(a: MovingBody, b: MovingBody, query: MotionQuery, arguments: tuple[Any, Any, Any, Any]) -> Impact:
@@ -98,7 +111,7 @@ def _impact_of_surfaces(a: MovingBody, b: MovingBody, query: MotionQuery) -> tup
     lower, upper, code = first_impact(first_a, a.motion, first_b, b.motion, query)
     if code == TOUCHES:
         lower, upper = _followed(a, b, query)
-        sure = overlap_time(first_a, a.motion, first_b, b.motion, query)
+        sure = first_certain_overlap((first_a, first_b), (a.motion, b.motion), query)
         if sure < lower:  # triangles that start in one plane go through each other, and do not meet again
             lower = 0.0
         upper = min(upper, sure)
@@ -124,7 +137,7 @@ def _certain_start(a: MovingBody, b: MovingBody, query: MotionQuery) -> tuple[fl
     touch = query.separation == 0.0 and found.signed_distance <= round_off
     if is_known and touch and found.signed_distance - found.error_bound < -round_off:
         # faces of concave solids in one plane: they may overlap, although no depth shows
-        sure = overlap_time(a.body.slots.first, a.motion, b.body.slots.first, b.motion, query)
+        sure = first_certain_overlap((a.body.slots.first, b.body.slots.first), (a.motion, b.motion), query)
         return 0.0, 0.0 if sure <= 0.0 else sure, method
     return None
 
@@ -133,8 +146,9 @@ def _followed(a: MovingBody, b: MovingBody, query: MotionQuery) -> tuple[float, 
     """Lower and upper (s) of objects that touch at the start, piece by piece."""
     near = query.separation + 2.0 * query.tolerance + 2.0 * round_off_of(a.body, b.body)
     try:
-        pieces = touching_pieces(a, b, near), touching_pieces(b, a, near)
-        lower, upper = touching_impact(*(laid_out(each) for each in pieces), query)
+        pieces = laid_out(touching_pieces(a, b, near)), laid_out(touching_pieces(b, a, near))
+        chains, motions = (a.body.slots.first, b.body.slots.first), (a.motion, b.motion)
+        lower, upper = first_impact_of_touching(chains, motions, pieces, query)
     except TooCostlyError:
         lower, upper = 0.0, inf
     if lower < inf == upper:
@@ -159,7 +173,7 @@ def _first_possible_impact(a: MovingBody, b: MovingBody, query: MotionQuery) -> 
     """First time (s) at which the solids of open meshes may meet; infinite for never."""
     poses = a.motion.pose, b.motion.pose
     places = location_of(a.body, poses[0], b.body, poses[1])
-    if any(place != OUTSIDE for place in places):
+    if any(place != Location.OUTSIDE for place in places):
         return 0.0
     if least_gap(a.body, poses[0], b.body, poses[1]) < query.separation - round_off_of(a.body, b.body):
         return 0.0
@@ -172,7 +186,3 @@ def _first_possible_impact(a: MovingBody, b: MovingBody, query: MotionQuery) -> 
             lower, _, _ = first_impact(slots[0].first, a.motion, slots[1].first, b.motion, query)
             first = min(first, lower)
     return first
-
-
-OUTSIDE: Final = 0
-_ = INSIDE

@@ -170,5 +170,4 @@ KIND: Final = Kind(
     corners=lambda shape: shape.corners,
     farthest=lambda shape: np.array(shape.size),
     exact=True,
-    packed=True,
 )

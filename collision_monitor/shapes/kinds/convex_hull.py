@@ -111,7 +111,6 @@ KIND: Final = Kind(
     corners=lambda shape: shape.points,
     middle=lambda shape: np.asarray(shape.points.mean(axis=0)),
     simple=False,
-    packed=True,
 )
 
 TRIANGLE: Final = Kind(
