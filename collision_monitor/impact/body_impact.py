@@ -27,6 +27,7 @@ from collision_monitor.impact.mesh_impact import mesh_impact
 from collision_monitor.impact.mesh_pair import SURFACES, has_mesh, shapes_within, triangles_contact
 from collision_monitor.impact.overlap_time import overlap_time
 from collision_monitor.impact.sphere_interval import meeting_of_spheres, relative_motion_at, sphere_interval
+from collision_monitor.impact.tree_impact import FULL
 from collision_monitor.meshes.distance.nearest import MEMORY, PLACE_A, PLACE_B, answer_row
 from collision_monitor.motion.bodies import next_pair, place_shape
 from collision_monitor.motion.motion import half_acceleration, relative_position, relative_velocity, rotation_at
@@ -134,7 +135,7 @@ def shape_impact(table, parts, pair, window, tube, query, scratch):
     """
     A, B, a, b = pair
     if has_mesh(table, a, b):
-        return mesh_impact(table, parts, pair, window, tube, query, scratch)
+        return mesh_impact(table, parts, pair, window, tube, query, FULL, scratch)
     begin, end = window
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out

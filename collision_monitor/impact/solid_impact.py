@@ -13,23 +13,26 @@ from collision_monitor.geometry.vector import dot
 from collision_monitor.impact.impact_record import CLEAR, HIT, UNRESOLVED
 from collision_monitor.impact.mesh_pair import root_of
 from collision_monitor.impact.tree_impact import (
-    FEWER_STEPS,
     HEAP,
     KEEP,
+    KEEP_EARLY,
     STEPS,
+    box_radius,
+    ending_gap,
     pop_first,
     push_pair,
-    spins,
+    steps_of,
     times_of,
     tree_approach_at,
 )
 from collision_monitor.meshes.distance.contact import reach_in
 from collision_monitor.meshes.distance.nearest import BOUNDS, PAIRS, size_of
-from collision_monitor.meshes.distance.solid import MovingSolid, SolidMemory, box_time, leaf_solid_time
+from collision_monitor.meshes.distance.solid import MovingSolid, SolidMemory, box_time, center_of, leaf_solid_time
 from collision_monitor.meshes.layout import CHILD, WIDTH
-from collision_monitor.meshes.placing import relative
+from collision_monitor.meshes.placing import inverse, place_point, relative
 from collision_monitor.narrow_phase.core import core_length
 from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.shapes.calls import point_distance_range
 from collision_monitor.shapes.kinds.half_space import HALF_SPACE
 
 EXAMINED: Final = 30
@@ -38,16 +41,16 @@ than any limit."""
 
 
 @outlined
-def solid_impact(table, parts, pair, window, tube, query, scratch):
-    """`shape_impact` of a tree and a solid, which may not be swapped: pair has both motions, then both slots."""
+def solid_impact(table, parts, pair, window, tube, query, ending, scratch):
+    """`tree_impact` of a tree and a solid, which may not be swapped: pair has both motions, then both slots."""
     A, B, a, b = pair
     begin, end = times_of(window)
     blocks, work, root = table.blocks, scratch.tree, root_of(table, a)
     memory = SolidMemory(scratch.triangle, scratch.work, work)
     own = 0.0 if table.kind[b] == HALF_SPACE else core_length(table, b)
-    start, later, steps, most = begin, end, 0, query.iterations * STEPS
-    if spins(A, B, end - begin):
-        most //= FEWER_STEPS
+    start, later, steps, most = begin, end, 0, steps_of(A, B, end - begin, query, ending)
+    is_early, gap = ending.tolerance > 0.0, query.tolerance
+    keep = KEEP_EARLY if is_early else KEEP
     waiting = push_pair(work, 0, begin, float(WIDTH * root), 0.0, 0.0)
     while True:
         if waiting == 0 or work[PAIRS] >= later:
@@ -58,20 +61,28 @@ def solid_impact(table, parts, pair, window, tube, query, scratch):
         waiting = pop_first(work, waiting)
         steps += 1
         if steps > most:
-            return UNRESOLVED, t, 1 + steps // STEPS, 0.0
+            return UNRESOLVED, t, 1 + steps // STEPS, gap
         margin = query.margin + tube.start + tube.growth * (t - begin)
         p, move = tree_approach_at(table, parts, pair, t, margin, tube.growth, end, scratch)
         R_a, R_b = scratch.rotation[2], scratch.rotation[3]
-        solid = MovingSolid(table, b, PairPose(R_a, R_b, p), relative(R_a, R_b, p), move)
+        X = relative(R_a, R_b, p)
+        solid = MovingSolid(table, b, PairPose(R_a, R_b, p), X, move)
         i, k = int(place) // WIDTH, int(place) % WIDTH
         child = blocks[i, CHILD, k]
         block = root + int(abs(child))
         speed = sqrt(dot(move.v, move.v)) + move.growth
         speed += sqrt(move.bend_a) * reach_in(blocks, root) + sqrt(move.bend_b) * own
+        if is_early:
+            gap = ending_gap(ending, speed, t, query)
+            _, farthest, _ = point_distance_range(table, b, place_point(inverse(X), center_of(blocks, i, k)))
+            if farthest + box_radius(blocks, i, k) <= gap + move.start:
+                return UNRESOLVED, t, 1 + steps // STEPS, gap
         if child < 0.0:
-            enough = (KEEP * size_of(blocks, i, k) + query.tolerance) / speed  # points have no size
-            soon, examined = leaf_solid_time(blocks, block, solid, query.tolerance, enough, memory)
+            enough = (keep * size_of(blocks, i, k) + gap) / speed  # points have no size
+            soon, examined = leaf_solid_time(blocks, block, solid, gap, enough, memory)
             steps += EXAMINED * examined
+            if is_early and t + soon <= t:
+                return UNRESOLVED, t, 1 + steps // STEPS, gap
             if soon == 0.0:
                 return HIT, t, 1 + steps // STEPS, 0.0
             if t + soon <= t:  # the time has no finer resolution
@@ -82,7 +93,7 @@ def solid_impact(table, parts, pair, window, tube, query, scratch):
                 if blocks[block, CHILD, m] != 0.0:
                     work[BOUNDS + m] = box_time(blocks, block, m, solid)
                     soon = min(soon, work[BOUNDS + m])
-        if child < 0.0 or (soon * speed > KEEP * size_of(blocks, i, k) and t + soon > t):
+        if child < 0.0 or (soon * speed > keep * size_of(blocks, i, k) and t + soon > t):
             if t + soon < end:
                 waiting = push_pair(work, waiting, t + soon, place, 0.0, 0.0)
             continue

@@ -25,8 +25,8 @@ from collision_monitor.shapes.kinds.half_space import HALF_SPACE
 from collision_monitor.shapes.registry import BALL, REVOLVED
 
 RESTS, PARTS, DEEPENS = range(3)
-"""What shapes do that touch: they are never deep within the window; they are apart at a time; they are deep from a time
-on, as far as one direction tells."""
+"""What shapes do that touch: they are never deep within the window; they are apart at a time; they may go into each
+other from a time on, as far as one direction tells."""
 
 HALVINGS: Final = 60
 """Times tried for the parting, each half of the one before: down to 1e-18 of the window."""
@@ -56,8 +56,14 @@ def _gap_along(table: Any, a: int, b: int, R_a: Any, R_b: Any, between: Vector, 
 
 
 @inlined
-def _turning(table: Any, s: int, R: Any, o: Vector, w: Vector) -> Vector:
-    """Angular velocity of a shape, without a rotation that leaves it as it is: of a ball, or of a wheel on its axle."""
+def _turning(table: Any, s: int, R: Any, o: Vector, w: Vector, n: Vector) -> Vector:
+    """Angular velocity of a shape, without a rotation that leaves its reach along n as it is.
+
+    That is one about n, of a ball, or of a wheel on its axle.
+    """
+    across = cross(w, n)
+    if dot(across, across) <= ALIGNED * ALIGNED * dot(w, w):
+        return AT_REST
     if o[0] == 0.0 and o[1] == 0.0 and o[2] == 0.0:
         if BALL[table.kind[s]]:
             return AT_REST
@@ -81,7 +87,8 @@ def touching_impact(table, parts, pair, window, skin, apart, separation, scratch
     out = scratch.out
     acceleration = (B.ax - A.ax, B.ay - A.ay, B.az - A.az)
     w_a, w_b = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
-    t, n, is_new = begin, AT_REST, True
+    t = before = begin
+    n, is_new = AT_REST, True
     for _ in range(STEPS):
         rotation_at(A, t, R_i)
         rotation_at(B, t, R_j)
@@ -94,12 +101,12 @@ def touching_impact(table, parts, pair, window, skin, apart, separation, scratch
             n = (out[NORMAL], out[NORMAL + 1], out[NORMAL + 2])
             gap, is_new = _gap_along(table, a, b, R_a, R_b, between, n) - separation, False
             if gap < -0.5 * skin:
-                return DEEPENS, t
+                return DEEPENS, before
         if gap > apart:
             return PARTS, t
         at = Placed(
             a, b, R_a, R_b, oa, ob, (px, py, pz), relative_velocity(A, B, t), acceleration,
-            _turning(table, a, R_a, oa, w_a), _turning(table, b, R_b, ob, w_b),
+            _turning(table, a, R_a, oa, w_a, n), _turning(table, b, R_b, ob, w_b, n),
         )  # fmt: skip
         d = advance_along_axis(table, at, n, AT_REST, 0.0, gap + skin, end - t)
         share = 1.0
@@ -118,6 +125,7 @@ def touching_impact(table, parts, pair, window, skin, apart, separation, scratch
         if d >= end - t:
             return RESTS, end
         if t + d <= t:
-            return DEEPENS, t
+            return DEEPENS, before
+        before = t
         t += d
-    return DEEPENS, t
+    return DEEPENS, before

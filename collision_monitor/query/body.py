@@ -43,17 +43,22 @@ class KeptSlots:
 
     def __init__(self, shape: Shape) -> None:
         kind = kind_of(shape)
-        is_simple, self.is_bounded = not (kind.planar or isinstance(shape, Mesh | Points)), kind.bounded
-        found = ((shape, _HERE),) if is_simple else tuple(exact_model(((shape, _HERE),)).pieces)
-        self.slots = laid_out(found)
+        self.is_bounded, self.is_planted = kind.bounded, False
+        self.pieces: PosedShapes | None = None
+        if kind.planar or isinstance(shape, Mesh | Points):
+            found = exact_model(((shape, _HERE),)).pieces
+            self.slots = laid_out(found)
+            self.has_mesh = any(isinstance(each, Mesh | Points) for each, _ in found)
+            self.is_convex = len(found) == 1 and not self.has_mesh
+            # a plane shape, whose pose has to be checked, and several pieces are completed like what is uncertain
+            is_answered = len(found) == 1 and isinstance(shape, Mesh)
+            self.inside = kept_tree(shape).inside if is_answered else UNCERTAIN
+            if not (len(found) == 1 and found[0][0] is shape):
+                self.pieces = found
+        else:
+            self.slots = LIBRARY.lay_out(((shape, None),))
+            self.has_mesh, self.is_convex, self.inside = False, True, CERTAIN
         self.first = self.slots.first
-        self.pieces: PosedShapes | None = None if len(found) == 1 and found[0][0] is shape else found
-        self.has_mesh = any(isinstance(each, Mesh | Points) for each, _ in found)
-        self.is_convex = len(found) == 1 and not self.has_mesh
-        # a plane shape, whose pose has to be checked, and several pieces are completed like what is uncertain
-        is_answered = is_simple or (len(found) == 1 and isinstance(shape, Mesh))
-        self.inside = UNCERTAIN if not is_answered else CERTAIN if is_simple else kept_tree(shape).inside
-        self.is_planted = False
 
 
 def kept_slots(shape: object) -> KeptSlots | None:

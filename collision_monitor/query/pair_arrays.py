@@ -14,7 +14,7 @@ from collision_monitor.query.body import kept_slots, plant
 from collision_monitor.shapes.compound import Compound
 from collision_monitor.shapes.pose import Pose, as_pose
 from collision_monitor.shapes.registry import Shape
-from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
+from collision_monitor.tolerances import LARGEST_INPUT, NORMALISED, UNIT_QUATERNION
 
 Array = NDArray[np.float64]
 Shapes = Compound | Sequence[Compound]
@@ -90,7 +90,7 @@ def pose_rows(value: Any, name: str) -> Array:
             f"{name}: expected quaternions of unit length within {UNIT_QUATERNION:g}, "
             f"got one of length {norm[bad[0]]:g} in row {bad[0]}"
         )
-    rows[:, 3:] /= norm[:, None]
+    rows[:, 3:] /= np.where(np.abs(norm - 1.0) <= NORMALISED, 1.0, norm)[:, None]
     return rows
 
 

@@ -10,6 +10,7 @@ import trimesh
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+import collision_monitor as cm
 from collision_monitor.geometry.polyhedra import edge_face, locate_in_polyhedron
 from collision_monitor.meshes.distance.nearest import MEMORY, PAIRS, PLACE_A, PLACE_B, answer_row, tree_distance
 from collision_monitor.meshes.extent import extents
@@ -187,15 +188,11 @@ def test_the_reach_of_a_tree_is_that_of_its_corners():
 
 
 def test_a_point_is_inside_a_closed_surface_where_the_exact_test_says_so():
-    from collision_monitor.query.contact.mesh_pairs import packed_trees_overlap, query_memory
-
     rng = np.random.default_rng(9)
-    tree = tree_of(SURFACES["ring"], closed=True)
+    ring = cm.Mesh(RING.vertices, RING.faces)
     points = rng.uniform(-1.5, 1.5, (300, 3)) * (1, 1, 0.4)
     expected = locate_in_polyhedron(points, RING.vertices, RING.faces) >= 0
-    dot = tree_of(np.zeros((1, 3, 3)))
-    poses = np.column_stack([points, np.zeros((300, 3)), np.ones(300)])
-    got = [bool(packed_trees_overlap(tree, np.eye(7)[6:], dot, pose[None], query_memory())) for pose in poses]
+    got = [cm.overlap(ring, cm.Pose(), cm.Points([point]), cm.Pose()) for point in points]
     assert got == expected.tolist()
     assert expected.any() and not expected.all()
 

@@ -15,7 +15,7 @@ from collision_monitor.impact.body_contact import RESULT, ROUND_OFF, chains_cont
 from collision_monitor.impact.body_impact import Scratch, make_scratch
 from collision_monitor.motion.bodies import Parts, chain_radius
 from collision_monitor.motion.motion import quaternion_to_matrix
-from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B
+from collision_monitor.narrow_phase.contact_row import BOUND, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.query.library import LIBRARY
 from collision_monitor.shapes.pose import Pose
@@ -92,7 +92,9 @@ def _contact(table, parts, chains, origin, p, limit, effort, scratch, row):
     if best < inf:
         for c in range(3):
             row[POINT_A + c] += origin[c]
-            row[POINT_B + c] = row[POINT_A + c] + row[DISTANCE] * row[NORMAL + c]
+            row[POINT_B + c] = row[POINT_A + c]
+            if best > -inf:  # else no translation parts two half-spaces
+                row[POINT_B + c] += best * row[NORMAL + c]
     return best, row[BOUND]
 
 
