@@ -19,6 +19,7 @@ PACKAGE = Path(__file__).parents[1] / NAME
 
 FLOORS: Final = (
     {"_jit", "errors", "tolerances", "records", "_version"},
+    {"checks"},
     {"settings", "geometry"},
     {"shapes"},
     {"geometry.lecture"},
