@@ -37,7 +37,7 @@ CALLED_FROM_OUTSIDE: Final = {
 }
 """Definitions that other packages call by their names."""
 
-CALLED_BY_TESTS: Final = {"tree_distance", "trees_touch", "separation_batch", "revolved_support_point"}
+CALLED_BY_TESTS: Final = {"tree_distance", "trees_touch", "separation_batch"}
 """Kernels that only tests call for the time being."""
 
 PACKAGE: Final = house.modules()
