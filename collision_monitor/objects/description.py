@@ -69,7 +69,7 @@ class ObjectDescription:
     the message may omit get their defaults here: an empty name, a group or mask of 0, an acceleration of NaN.
     Raises InputError; ShapeError for the shapes.
 
-    >>> from collision_monitor.shapes.shapes import Sphere
+    >>> from collision_monitor.shapes.registry import Sphere
     >>> ObjectDescription(7, Sphere(0.5), name="ball").name
     'ball'
     """
