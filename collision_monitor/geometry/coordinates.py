@@ -1,10 +1,11 @@
-"""Input check of the geometry functions: finite arrays of the expected shape, or an error that names the array."""
+"""Input check of the geometry functions: points, vectors and triangles as finite arrays of the expected shape."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from collision_monitor.checks.numbers import as_numbers
 from collision_monitor.errors import InputError, ShapeError
 
 Array = NDArray[np.float64]
@@ -16,27 +17,12 @@ Signs = NDArray[np.int8]
 def coordinates(value: ArrayLike, what: str, *widths: int) -> Array:
     """Points or vectors (..., width), at least one, with a width of `widths` (default 2 or 3). Raises InputError."""
     widths = widths or (2, 3)
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{what}: expected numbers, got {value!r:.100}") from None
+    array = as_numbers(value, what)
     if array.ndim == 0 or array.shape[-1] not in widths or array.size == 0:
         shapes = " or ".join(f"(..., {width})" for width in widths)
         raise InputError(f"{what}: expected at least one point, shape {shapes}, got shape {array.shape}")
     if not np.isfinite(array).all():
         raise InputError(f"{what}: expected finite coordinates, got NaN or infinity")
-    return array
-
-
-def checked_numbers(value: ArrayLike, what: str, least: float = -np.inf) -> Array:
-    """Finite numbers (...) >= `least`. Raises InputError."""
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{what}: expected numbers, got {value!r:.100}") from None
-    if not np.isfinite(array).all() or (array < least).any():
-        bound = f" >= {least:g}" if least > -np.inf else ""
-        raise InputError(f"{what}: expected finite numbers{bound}, got {value!r:.100}")
     return array
 
 

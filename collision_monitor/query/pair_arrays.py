@@ -9,6 +9,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.checks.numbers import checked_rows
 from collision_monitor.errors import InputError, PoseError, ShapeError
 from collision_monitor.query.arguments import Compound
 from collision_monitor.query.packed import packed_shape
@@ -71,7 +72,7 @@ def pose_rows(value: Any, name: str) -> Array:
         value = [value]
     if isinstance(value, Sequence) and len(value) and all(isinstance(pose, Pose) for pose in value):
         return np.array([np.concatenate([pose.position, pose.quaternion]) for pose in value])
-    rows = number_rows(value, 7, name)
+    rows = checked_rows(value, 7, name, LARGEST_INPUT, PoseError)
     norm = np.sqrt(np.einsum("ni,ni->n", rows[:, 3:], rows[:, 3:]))
     bad = np.flatnonzero(~(np.abs(norm - 1.0) <= UNIT_QUATERNION))
     if len(bad):
@@ -86,20 +87,6 @@ def pose_rows(value: Any, name: str) -> Array:
 def pose_of(row: Array) -> Pose:
     """Pose of a row of `pose_rows` to the bit: normalising its quaternion again could change the last one."""
     return Pose.of_numbers(row[:7].tolist())
-
-
-def number_rows(value: Any, width: int, name: str) -> Array:
-    """Copy of an array (N, width) of finite numbers; one row may lack its dimension. Raises InputError, PoseError."""
-    try:
-        rows = np.atleast_2d(np.array(value, dtype=np.float64))
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: expected numbers (N, {width}), got {type(value).__name__}") from None
-    if rows.ndim != 2 or rows.shape[1] != width:
-        raise InputError(f"{name}: expected an array (N, {width}), got shape {np.shape(value)}")
-    bad = np.flatnonzero(~(np.abs(rows) <= LARGEST_INPUT).all(axis=1))
-    if len(bad):
-        raise PoseError(f"{name}: expected finite numbers up to {LARGEST_INPUT:g}, got others in row {bad[0]}")
-    return np.ascontiguousarray(rows)
 
 
 def pair_count(**lengths: int) -> int:

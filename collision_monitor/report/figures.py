@@ -45,7 +45,7 @@ def figures(history: History, facts: ReportFacts, size: Size) -> dict[str, Figur
         "predicted": _predicted,
         "distances": _distances,
         "events": from_above,
-        "steps": _steps,
+        "steps": lambda history, _, size: _steps(history, size),
     }
     with mpl.rc_context(STYLE):
         drawn = {name: function(history, facts, size) for name, function in draw.items()}
@@ -206,7 +206,7 @@ def _distances(history: History, facts: ReportFacts, size: Size) -> Figure | Non
     return figure
 
 
-def _steps(history: History, facts: ReportFacts, size: Size) -> Figure | None:
+def _steps(history: History, size: Size) -> Figure | None:
     if not len(history.durations):
         return None
     milliseconds = history.durations * 1e3

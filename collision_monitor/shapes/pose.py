@@ -41,20 +41,6 @@ def _advice(shape: tuple[int, ...]) -> str:
     return {(4, 4): matrix, (3, 3): matrix, (3,): angles}.get(shape, "")
 
 
-def unit_quaternion(value: ArrayLike) -> Array:
-    """Normalise a quaternion (x, y, z, w) within 1e-3 of unit length. Raises PoseError beyond."""
-    q = checked_vector(value, "quaternion", 4)
-    norm = float(np.linalg.norm(q))
-    if abs(norm - 1.0) > UNIT_QUATERNION:
-        raise PoseError(
-            f"quaternion: expected x, y, z, w of unit length within {UNIT_QUATERNION:g}, "
-            f"got {q.tolist()} of length {norm:g}"
-        )
-    q = q / norm
-    q.setflags(write=False)
-    return q
-
-
 def multiply(a: ArrayLike, b: ArrayLike) -> Array:
     """Hamilton product of quaternions (..., 4): the rotation b, then a."""
     ax, ay, az, aw = np.moveaxis(np.asarray(a, dtype=np.float64), -1, 0)

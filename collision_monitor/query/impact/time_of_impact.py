@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from collision_monitor.checks.numbers import checked_number, checked_whole
 from collision_monitor.errors import TooCostlyError, UnsupportedError
 from collision_monitor.impact.impact_record import HIT
 from collision_monitor.meshes.trees.shape_trees import CERTAIN, kept_tree
 from collision_monitor.motion.bodies import Multibody
-from collision_monitor.query.arguments import Compound, finite_number, whole_number
+from collision_monitor.query.arguments import Compound
 from collision_monitor.query.contact.contact import Contact, contact
 from collision_monitor.query.contact.fillings import fillings
 from collision_monitor.query.contact.open_gap import least_gap
@@ -74,7 +75,7 @@ def time_of_impact(
     if method != "conservative_advancement":
         from collision_monitor.query.impact.impact_by_method import impact_by_method  # which loads the other kernels
 
-        duration = finite_number("step", step, positive=True)
+        duration = checked_number(step, "step", least=0.0, above=True)
         return impact_by_method(shape_a, motion_a, shape_b, motion_b, query, method, duration)
     arguments = shape_a, motion_a, shape_b, motion_b
     is_open = _is_open(shape_a) or _is_open(shape_b)
@@ -169,10 +170,10 @@ def check_query(horizon: float, tolerance: float, separation: float, iterations:
 @lru_cache(maxsize=16, typed=True)
 def _checked(horizon: Any, tolerance: Any, separation: Any, iterations: Any) -> MotionQuery:
     return MotionQuery(
-        horizon=finite_number("horizon", horizon),
-        tolerance=finite_number("tolerance", tolerance, positive=True),
-        separation=finite_number("separation", separation),
-        iterations=whole_number("iterations", iterations),
+        horizon=checked_number(horizon, "horizon", least=0.0),
+        tolerance=checked_number(tolerance, "tolerance", least=0.0, above=True),
+        separation=checked_number(separation, "separation", least=0.0),
+        iterations=checked_whole(iterations, "iterations"),
     )
 
 

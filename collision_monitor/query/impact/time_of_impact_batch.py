@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from collision_monitor.checks.numbers import as_numbers
 from collision_monitor.errors import InputError, PoseError
 from collision_monitor.impact.body_impact import ImpactQuery, make_scratch
 from collision_monitor.impact.impact_record import IMPACT
@@ -148,10 +149,7 @@ def _states(poses: ArrayLike, twists: ArrayLike, name: str) -> Array:
     """Return checked poses and twists side by side (N, 13), with normalised quaternions."""
     columns = []
     for value, width, what in ((poses, 7, "poses"), (twists, 6, "twists")):
-        try:
-            array = np.atleast_2d(np.asarray(value, dtype=np.float64))
-        except (TypeError, ValueError):
-            raise InputError(f"{what} {name}: expected numbers (N, {width}), got {type(value).__name__}") from None
+        array = np.atleast_2d(as_numbers(value, f"{what} {name}", f"numbers (N, {width})"))
         if array.ndim != 2 or array.shape[1] != width:
             raise InputError(f"{what} {name}: expected an array (N, {width}), got shape {np.shape(value)}")
         columns.append(array)

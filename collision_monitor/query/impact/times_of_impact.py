@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from collision_monitor.checks.numbers import checked_rows
+from collision_monitor.errors import PoseError
 from collision_monitor.query.batch_result import Pairs
 from collision_monitor.query.contact.convex_pairs import MEMORY
 from collision_monitor.query.impact.moving_pair import ITERATIONS
@@ -17,13 +19,13 @@ from collision_monitor.query.impact.time_of_impact_batch import Impacts, motion_
 from collision_monitor.query.pair_arrays import (
     Progress,
     Shapes,
-    number_rows,
     pack_shapes,
     pair_count,
     pair_ranges,
     part,
     pose_rows,
 )
+from collision_monitor.tolerances import LARGEST_INPUT
 
 
 def times_of_impact(
@@ -57,7 +59,7 @@ def times_of_impact(
     a, b = pack_shapes(shapes_a, "shapes A"), pack_shapes(shapes_b, "shapes B")
     states = []
     for poses, twists, name in ((poses_a, twists_a, "A"), (poses_b, twists_b, "B")):
-        x, v = pose_rows(poses, f"poses {name}"), number_rows(twists, 6, f"twists {name}")
+        x, v = pose_rows(poses, f"poses {name}"), checked_rows(twists, 6, f"twists {name}", LARGEST_INPUT, PoseError)
         state = np.zeros((pair_count(poses=len(x), twists=len(v)), 16))
         state[:, :7], state[:, 7:13] = x, v
         states.append(state)

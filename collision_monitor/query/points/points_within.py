@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.checks.numbers import checked_number
 from collision_monitor.errors import PoseError, ShapeError, UnsupportedError
 from collision_monitor.objects.models import exact_model
-from collision_monitor.query.arguments import Compound, finite_number
+from collision_monitor.query.arguments import Compound
 from collision_monitor.query.contact.surface_pair import points_near
 from collision_monitor.shapes.compound import shape_pairs
 from collision_monitor.shapes.planar import is_planar
@@ -37,7 +38,7 @@ def points_within(
     shapes = shape_pairs(shape, "shape")
     if any(is_planar(each) for each, _ in shapes):
         raise UnsupportedError("points_within: expected solid shapes, got Circle or Polygon")
-    distance = finite_number("limit", limit)
+    distance = checked_number(limit, "limit", least=0.0)
     near = np.zeros(len(cloud.points), np.bool_)
     for piece, offset in exact_model(shapes).pieces:
         near |= points_near(cloud.points, cloud.radius, pose, piece, shape_pose @ offset, distance)

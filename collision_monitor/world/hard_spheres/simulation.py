@@ -25,7 +25,6 @@ from collision_monitor.world.hard_spheres.state import (
     LOGGED,
     VELOCITY,
     VIRIAL,
-    WALL_HITS,
     WALL_IMPULSE,
     Floats,
     largest_half_cell,
@@ -208,11 +207,6 @@ class HardSpheres:
     def collisions(self) -> int:
         """Number of collisions of two spheres since the start."""
         return int(self._state.totals[COLLISIONS])
-
-    @property
-    def wall_collisions(self) -> int:
-        """Number of collisions with a wall since the start."""
-        return int(self._state.totals[WALL_HITS])
 
     @property
     def packing(self) -> float:
