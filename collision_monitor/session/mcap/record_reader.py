@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from io import SEEK_CUR, BytesIO
@@ -17,6 +18,7 @@ from collision_monitor.session.mcap.chunk import LARGEST_CHUNK, Unpacker, record
 from collision_monitor.session.mcap.definitions_in_force import LARGEST_DEFINITION, DefinitionsInForce
 from collision_monitor.session.mcap.layout import CHUNK_HEAD, HEAD, MAGIC, MESSAGE
 from collision_monitor.session.mcap.sentences import add_sentence
+from collision_monitor.settings.regular_file import open_regular
 
 _GLANCE: Final = 256
 """Bytes of a record that hold its times and its name."""
@@ -58,15 +60,15 @@ class McapReader:
         self.position = 0
         self._unpacker = Unpacker(0)
         self._in_force = DefinitionsInForce()
-        try:
-            self.size = path.stat().st_size
-            with path.open("rb") as file:
-                magic = file.read(len(MAGIC))
-        except OSError as error:
-            raise SessionError(f"{path}: expected a file that can be read, got: {error.strerror}") from None
+        with self._open() as file:
+            self.size = os.fstat(file.fileno()).st_size
+            magic = file.read(len(MAGIC)) or b""
         if magic != MAGIC:
             what = f"it begins with {magic!r}" if magic else "the file is empty"
             raise SessionError(f"{path}: expected an MCAP file, but {what}")
+
+    def _open(self) -> BinaryIO:
+        return open_regular(self.path, "an MCAP file", refused=SessionError)
 
     def __iter__(self) -> Iterator[Any]:
         """Yield header, schemas, channels, messages, metadata and attachments, also those in chunks.
@@ -80,7 +82,7 @@ class McapReader:
         self.damage = []
         self._unpacker = Unpacker(self.size)
         self._in_force = DefinitionsInForce()
-        with self.path.open("rb") as file:
+        with self._open() as file:
             for start, opcode, length in self._heads(file):
                 limit = _LARGEST.get(opcode, 0)
                 if not 0 < length <= limit:
@@ -105,7 +107,7 @@ class McapReader:
     def glance(self) -> Iterator[tuple[int, int, bytes]]:
         """Yield offset, opcode and first bytes of each record in the file, without unpacking it."""
         self.damage = []
-        with self.path.open("rb") as file:
+        with self._open() as file:
             for start, opcode, length in self._heads(file):
                 yield start, opcode, file.read(min(length, _GLANCE))
                 file.seek(start + HEAD.size + length)
