@@ -49,9 +49,10 @@ class FileLocator:
         found = [found_instead(folder / rest) for folder in folders]
         if "" in found:
             return folders[found.index("")] / rest
-        searched = ", ".join(f"{folder}: {what}" for folder, what in zip(folders[:_SHOWN], found, strict=False))
+        there = zip(folders[:_SHOWN], found, strict=False)
+        searched = ", ".join(f"{folder}: {what}" for folder, what in there) or "no folder"
         raise InputError(
-            f"expected the file {address!r:.200} in the package {name!r:.80}, got none (searched: {searched or 'no folder'}); "
+            f"expected the file {address!r:.200} in the package {name!r:.80}, got none (searched: {searched}); "
             f"source the workspace that has it, or give its folder under `packages`"
         )
 

@@ -18,8 +18,8 @@ from collision_monitor.robots.mesh_location import FileLocator
 from collision_monitor.robots.srdf import Pair, disabled_pairs
 from collision_monitor.robots.touching_links import touching_links
 from collision_monitor.robots.urdf import parse_urdf
-from collision_monitor.robots.xml_tree import LARGEST_TEXT
 from collision_monitor.settings.regular_file import read_regular
+from collision_monitor.settings.xml_tree import LARGEST_TEXT
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Shape
 

@@ -18,7 +18,8 @@ from collision_monitor.errors import CollisionMonitorError, InputError
 READABLE: Final = "a file that can be read"
 
 FOLDER: Final = "a folder"
-"""What `found_instead` returns for one."""
+NOTHING: Final = "nothing there"
+"""What `found_instead` returns for a folder, and for a path that does not exist."""
 
 _LFS: Final = b"version https://git-lfs.github.com/spec/"
 """How the text begins that Git leaves in place of a large file."""
@@ -37,7 +38,7 @@ def found_instead(path: Path) -> str:
     try:
         mode = path.stat().st_mode
     except FileNotFoundError:
-        return "nothing there"
+        return NOTHING
     except OSError as error:  # a name that is too long, a folder without permission, a loop of links
         return str(error.strerror or error)
     except ValueError as error:  # a path with a NUL

@@ -18,7 +18,7 @@ import numpy as np
 from collision_monitor.errors import InputError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
-from collision_monitor.settings.regular_file import FOLDER, found_instead
+from collision_monitor.settings.regular_file import FOLDER, NOTHING, found_instead
 from collision_monitor.shapes.pose import from_rotation_vector, multiply
 from collision_monitor.shapes.registry import Box, Cylinder, Shape
 from collision_monitor.world.scene import TIME_ROUND_OFF, Scene, States, positive_rate, state_array
@@ -152,6 +152,8 @@ def _find_clips(path: Path | None) -> list[list[Path]]:
         files = [file for ending in (_PEOPLE, _CARTS) for file in sorted(path.glob(f"*{ending}"))]
         prefixes = sorted({_prefix(file).name for file in files})
         clips = [[f for f in files if f.name in (prefix + _PEOPLE, prefix + _CARTS)] for prefix in prefixes]
+    elif found != NOTHING:
+        raise InputError(f"path: expected {give}, got {found}: {path}")
     else:
         files = [path.with_name(path.name + ending) for ending in (_PEOPLE, _CARTS)]
         clips = [[file for file in files if not found_instead(file)]]

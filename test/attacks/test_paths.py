@@ -1,4 +1,4 @@
-"""Every path that a command or a running node opens, leading to no regular file: refused in one line, without waiting."""
+"""Every path that a command or a running node opens, leading to no regular file: refused at once, in one line."""
 
 from __future__ import annotations
 
@@ -93,9 +93,11 @@ def test_a_command_names_what_it_found_in_place_of_a_file(
         capsys.readouterr()
         with without_waiting():
             assert main([str(path) if each == "PATH" else names.get(each, each) for each in arguments]) in (1, 2), kind
-        error = capsys.readouterr().err
-        assert error.startswith("collision-monitor: error: ") and error.count("\n") == 1, (kind, error)
-        if kind == "folder" and suffix in (".mcap", ".db3", ".bag") or kind == "missing" and suffix == "_ped.csv":
+        said = capsys.readouterr()
+        error = said.err if door != "check" else said.out  # it reads several sessions and goes on
+        if door != "check":
+            assert error.startswith("collision-monitor: error: ") and error.count("\n") == 1, (kind, error)
+        if (kind == "folder" and suffix in (".mcap", ".db3", ".bag")) or (kind == "missing" and suffix == "_ped.csv"):
             continue  # a folder may be that of a session or a bag, and a name the prefix of several files
         assert text in error, (kind, error)
     assert not (tmp_path / "out.mcap").exists()

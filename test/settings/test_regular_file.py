@@ -13,6 +13,7 @@ from no_files import NO_FILES, sparse
 from collision_monitor.errors import CollisionMonitorError, InputError, SessionError, ShapeError
 from collision_monitor.settings.regular_file import found_instead, open_regular, read_regular
 
+
 @pytest.mark.parametrize("kind", NO_FILES)
 @pytest.mark.parametrize("refused", [InputError, SessionError, ShapeError])
 def test_what_is_no_regular_file_is_called_by_its_name(
@@ -69,7 +70,5 @@ def test_a_file_without_permission_says_so(tmp_path: Path) -> None:
         except InputError as error:
             print(error)
     """
-    done = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(code)], cwd=tmp_path, capture_output=True, text=True
-    )
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(code)], cwd=tmp_path, capture_output=True, text=True)
     assert done.stdout == "secret: expected a file that can be read, got Permission denied\n", done.stderr
