@@ -171,6 +171,7 @@ OPENERS = {
     "settings/regular_file.py": "the one opener",
     "session/recording/session_file.py": "writes",
     "session/mcap/salvage.py": "writes",
+    "sources/bag.py": "writes a copy that is unpacked",
     "session/mcap/definitions.py": "reads a file of this package",
     "session/history/growing_rows.py": "reads /proc/meminfo",
     "monitor/state/snapshot.py": "reads an entry of an archive in memory",

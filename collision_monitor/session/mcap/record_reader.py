@@ -67,6 +67,13 @@ class McapReader:
             what = f"it begins with {magic!r}" if magic else "the file is empty"
             raise SessionError(f"{path}: expected an MCAP file, but {what}")
 
+    def opened(self) -> BinaryIO:
+        """Open the file, to read its records from the start on."""
+        self.damage = []
+        self._unpacker = Unpacker(self.size)
+        self._in_force = DefinitionsInForce()
+        return self._open()
+
     def _open(self) -> BinaryIO:
         return open_regular(self.path, "an MCAP file", refused=SessionError)
 
@@ -79,30 +86,48 @@ class McapReader:
 
     def read(self, begin: int = 0) -> Iterator[Any]:
         """Yield the same. begin: offset of a record; the records from the first message up to it are skipped."""
-        self.damage = []
-        self._unpacker = Unpacker(self.size)
-        self._in_force = DefinitionsInForce()
-        with self._open() as file:
-            for start, opcode, length in self._heads(file):
-                limit = _LARGEST.get(opcode, 0)
-                if not 0 < length <= limit:
-                    if limit:
-                        found = f"expected 1 to {limit} bytes"
-                        self._note(f"{_name(opcode)} of {length} bytes at byte {start} is damaged: {found}")
-                    file.seek(length, SEEK_CUR)
-                    continue
-                # The library raises many kinds of errors for wrong bytes. Each means that the record is damaged.
-                try:
-                    found_records = self._unpack(opcode, file.read(length))
-                except Exception as error:
-                    reason = str(error) or repr(error)
-                    self._note(f"{_name(opcode)} of {length} bytes at byte {start} is damaged: {reason}")
-                    continue
+        with self.opened() as file:
+            for start, found_records in self._sections(file):
                 for record in found_records:
                     if start < begin and isinstance(record, Message):
                         file.seek(begin)
                         break
                     yield record
+
+    def sections(self) -> Iterator[tuple[int, Iterable[Any]]]:
+        """Yield the offset of each record in the file, with the records that it holds: those of a chunk, or itself."""
+        with self.opened() as file:
+            yield from self._sections(file)
+
+    def record_at(self, file: BinaryIO, start: int) -> Iterable[Any]:
+        """Return what the record at an offset holds, which `sections` yielded before. file: from `opened`.
+
+        Raises SessionError.
+        """
+        file.seek(start)
+        try:
+            opcode, length = HEAD.unpack(file.read(HEAD.size))
+            return self._unpack(opcode, file.read(length))
+        except Exception as error:  # as above
+            raise SessionError(f"{self.path}: expected the bytes of before, got others: {error}") from None
+
+    def _sections(self, file: BinaryIO) -> Iterator[tuple[int, Iterable[Any]]]:
+        for start, opcode, length in self._heads(file):
+            limit = _LARGEST.get(opcode, 0)
+            if not 0 < length <= limit:
+                if limit:
+                    found = f"expected 1 to {limit} bytes"
+                    self._note(f"{_name(opcode)} of {length} bytes at byte {start} is damaged: {found}")
+                file.seek(length, SEEK_CUR)
+                continue
+            # The library raises many kinds of errors for wrong bytes. Each means that the record is damaged.
+            try:
+                found_records = self._unpack(opcode, file.read(length))
+            except Exception as error:
+                reason = str(error) or repr(error)
+                self._note(f"{_name(opcode)} of {length} bytes at byte {start} is damaged: {reason}")
+                continue
+            yield start, found_records
 
     def glance(self) -> Iterator[tuple[int, int, bytes]]:
         """Yield offset, opcode and first bytes of each record in the file, without unpacking it."""
