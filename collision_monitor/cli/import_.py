@@ -58,7 +58,9 @@ def add_parser(subparsers: Any) -> None:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("bag", type=Path, metavar="BAG", help=".mcap, .db3 or .bag (ROS 1) file, or the folder of a bag")
+    parser.add_argument(
+        "bag", type=Path, metavar="BAG", help=".mcap, .db3 or .bag (ROS 1) file, or the folder of a bag"
+    )
     parser.add_argument("--map", type=Path, metavar="FILE", help="mapping file (YAML)")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT", help="new session (.mcap)")
     parser.add_argument(

@@ -11,12 +11,12 @@ from typing import Any, BinaryIO, Final, NamedTuple
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Header, Metadata, Schema
+from mcap.records import Attachment, Channel, Header, Metadata, Schema, Statistics
 
 from collision_monitor.errors import SessionError
 from collision_monitor.session.mcap.chunk import LARGEST_CHUNK, Unpacker, records
 from collision_monitor.session.mcap.definitions_in_force import LARGEST_DEFINITION, DefinitionsInForce
-from collision_monitor.session.mcap.layout import CHUNK_HEAD, HEAD, MAGIC, MESSAGE
+from collision_monitor.session.mcap.layout import CHUNK_HEAD, FOOTER, HEAD, MAGIC, MESSAGE
 from collision_monitor.session.mcap.sentences import add_sentence
 from collision_monitor.settings.regular_file import open_regular
 
@@ -33,6 +33,9 @@ _LARGEST: Final[dict[int, int]] = {
     Opcode.CHANNEL: LARGEST_DEFINITION,
 }
 """Bytes of a record that is read; longer ones are damage. Records of other kinds are skipped unread."""
+
+_LARGEST_SUMMARY: Final = 64 << 20
+"""Bytes of the schemas, channels and statistics in a summary: those of 10,000 topics."""
 
 _DEFINITIONS: Final = 1 << 17
 """Schemas and channels in one chunk: there are 2^16 ids of each."""
@@ -86,13 +89,18 @@ class McapReader:
 
     def read(self, begin: int = 0) -> Iterator[Any]:
         """Yield the same. begin: offset of a record; the records from the first message up to it are skipped."""
+        count = 0
         with self.opened() as file:
             for start, found_records in self._sections(file):
                 for record in found_records:
-                    if start < begin and isinstance(record, Message):
-                        file.seek(begin)
-                        break
+                    if isinstance(record, Message):
+                        if start < begin:
+                            file.seek(begin)
+                            break
+                        count += 1
                     yield record
+        if self.position == self.size and not (begin or self.damage):
+            self._compare(count)
 
     def sections(self) -> Iterator[tuple[int, Iterable[Any]]]:
         """Yield the offset of each record in the file, with the records that it holds: those of a chunk, or itself."""
@@ -136,6 +144,42 @@ class McapReader:
             for start, opcode, length in self._heads(file):
                 yield start, opcode, file.read(min(length, _GLANCE))
                 file.seek(start + HEAD.size + length)
+
+    def summary(self) -> Iterator[tuple[int, bytes]]:
+        """Yield kind and content of the schemas, channels and statistics in the summary; nothing if there is none.
+
+        Raises ValueError if the file does not end like an MCAP file, or if they are too large.
+        """
+        with self._open() as file:
+            file.seek(max(0, self.size - len(MAGIC) - FOOTER.size - HEAD.size))
+            end = file.read()
+            head = HEAD.unpack_from(end) if len(end) == HEAD.size + FOOTER.size + len(MAGIC) else (0, 0)
+            if head != (Opcode.FOOTER, FOOTER.size) or not end.endswith(MAGIC):
+                raise ValueError("its end is no end of an MCAP file")
+            at = FOOTER.unpack_from(end, HEAD.size)[0] or self.size
+            room = _LARGEST_SUMMARY
+            while at + HEAD.size <= self.size:
+                file.seek(at)
+                opcode, length = HEAD.unpack(file.read(HEAD.size))
+                if opcode == Opcode.FOOTER or length > self.size - at - HEAD.size:
+                    return
+                if opcode in (Opcode.STATISTICS, *_DEFINED):
+                    room -= length
+                    if room < 0:
+                        raise ValueError(f"its summary is larger than {_LARGEST_SUMMARY} bytes")
+                    yield opcode, file.read(length)
+                at += HEAD.size + length
+
+    def _compare(self, count: int) -> None:
+        """Compare the number of messages that were read with the statistics of the summary."""
+        try:
+            for opcode, content in self.summary():
+                if opcode == Opcode.STATISTICS:
+                    stated = Statistics.read(ReadDataStream(BytesIO(content))).message_count
+                    if stated != count:
+                        self._note(f"its summary states {stated} messages, there are {count}")
+        except Exception:  # the library raises many kinds of errors; a summary is not needed to read a session
+            return
 
     def _note(self, text: str) -> None:
         add_sentence(self.damage, text)

@@ -13,17 +13,12 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Schema, Statistics
 
 from collision_monitor.errors import SessionError
-from collision_monitor.session.mcap.layout import FOOTER, HEAD, MAGIC
 from collision_monitor.session.mcap.record_reader import McapReader, Message
-from collision_monitor.settings.regular_file import open_regular
 from collision_monitor.sources.ros1_messages import ROS1, ros2_name
 from collision_monitor.sources.storage.stored_channel import LATEST, StoredChannel, StoredMessage, damaged_bag
 from collision_monitor.sources.storage.time_order import TimeOrder
 
 SALVAGE_HINT: Final = "; `collision-monitor salvage` recovers its complete messages"
-
-_LARGEST_SUMMARY: Final = 64 << 20
-"""Bytes of the schemas, channels and statistics in a summary: those of 10,000 topics."""
 
 
 class McapStorage:
@@ -98,45 +93,20 @@ class McapStorage:
         Raises SessionError for a file that is cut off.
         """
         statistics: Statistics | None = None
-        for opcode, content in self._summary():
-            try:
+        try:
+            for opcode, content in self._reader.summary():
+                stream = ReadDataStream(BytesIO(content))
                 if opcode == Opcode.STATISTICS:
-                    statistics = Statistics.read(ReadDataStream(BytesIO(content)))
+                    statistics = Statistics.read(stream)
                 elif opcode == Opcode.SCHEMA:
-                    schema = Schema.read(ReadDataStream(BytesIO(content)))
+                    schema = Schema.read(stream)
                     self._schemas.setdefault(schema.id, schema)
-                else:
-                    channel = Channel.read(ReadDataStream(BytesIO(content)))
-                    if channel.id not in self._channels:
-                        self._define(channel)
-            except Exception as error:  # the library raises many kinds of errors for wrong bytes
-                raise SessionError(damaged_bag(self._path, f"its summary: {error!r:.100}{SALVAGE_HINT}")) from None
+                elif (channel := Channel.read(stream)).id not in self._channels:
+                    self._define(channel)
+        except Exception as error:  # the library raises many kinds of errors for wrong bytes
+            reason = str(error) or repr(error)
+            raise SessionError(damaged_bag(self._path, f"{reason:.200}{SALVAGE_HINT}")) from None
         return statistics
-
-    def _summary(self) -> Iterator[tuple[int, bytes]]:
-        """Yield the schemas, the channels and the statistics of the summary."""
-        with open_regular(self._path, "a bag", refused=SessionError) as file:
-            size = self._reader.size
-            file.seek(max(0, size - len(MAGIC) - FOOTER.size - HEAD.size))
-            end = file.read()
-            head = HEAD.unpack_from(end) if len(end) == HEAD.size + FOOTER.size + len(MAGIC) else (0, 0)
-            if head != (Opcode.FOOTER, FOOTER.size) or not end.endswith(MAGIC):
-                raise SessionError(damaged_bag(self._path, f"its end is no end of an MCAP file{SALVAGE_HINT}"))
-            at = FOOTER.unpack_from(end, HEAD.size)[0] or size
-            room = _LARGEST_SUMMARY
-            while at + HEAD.size <= size:
-                file.seek(at)
-                opcode, length = HEAD.unpack(file.read(HEAD.size))
-                if opcode == Opcode.FOOTER or length > size - at - HEAD.size:
-                    return
-                if opcode in (Opcode.STATISTICS, Opcode.SCHEMA, Opcode.CHANNEL):
-                    room -= length
-                    if room < 0:
-                        raise SessionError(
-                            damaged_bag(self._path, f"its summary is larger than {_LARGEST_SUMMARY} bytes")
-                        )
-                    yield opcode, file.read(length)
-                at += HEAD.size + length
 
     def _compare(self, statistics: Statistics | None) -> None:
         """Note what the statistics say of each channel, or compare the total if they do not name the channels."""
