@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -13,11 +15,57 @@ Indices = NDArray[np.int64]
 Signs = NDArray[np.int8]
 
 
+_KINDS = "biuf"
+"""Kinds of NumPy's types whose values are numbers. Others convert too, but lose a part (complex) or a unit (times)."""
+
+
+def real_array(value: Any) -> Array:
+    """Return the numbers of an array, a list or the like as float64; a copy only if it has to be one.
+
+    Raises TypeError, ValueError or OverflowError for anything else: also for complex numbers, texts and times, and for
+    a masked array that hides some of its numbers, which NumPy would convert in silence.
+    """
+    if type(value) is np.ndarray and value.dtype == np.float64:
+        return value
+    parts = value if isinstance(value, list | tuple) else (value,)
+    if any(map(hides_some, parts)):
+        raise TypeError("numbers are masked")
+    array = np.asarray(value)
+    if array.dtype.kind == "O" and not any(isinstance(each, str | bytes | complex) for each in array.flat):
+        return array.astype(np.float64)  # Fraction, Decimal and the like
+    if array.dtype.kind not in _KINDS:
+        raise TypeError(f"expected numbers, got {array.dtype}")
+    return np.asarray(array, np.float64)
+
+
+def hides_some(value: Any) -> bool:
+    """Whether a value is a masked array that hides some of its elements."""
+    if not isinstance(value, np.ma.MaskedArray):
+        return False
+    return bool(np.ascontiguousarray(np.ma.getmaskarray(value)).view(np.bool_).any())
+
+
+def given_array(value: Any, what: str) -> Array:
+    """Return the numbers of an array as `real_array` does. Raises InputError."""
+    try:
+        return real_array(value)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"{what}: expected an array of numbers, got {type(value).__name__}") from None
+
+
+def real_number(value: Any) -> float:
+    """Return one number. Raises TypeError, ValueError or OverflowError for anything else, as `real_array` does."""
+    kind = type(value)
+    if kind is float or kind is int or kind is np.float64:
+        return float(value)
+    return float(real_array(value))
+
+
 def coordinates(value: ArrayLike, what: str, *widths: int) -> Array:
     """Points or vectors (..., width), at least one, with a width of `widths` (default 2 or 3). Raises InputError."""
     widths = widths or (2, 3)
     try:
-        array = np.asarray(value, dtype=np.float64)
+        array = real_array(value)
     except (TypeError, ValueError, OverflowError):
         raise InputError(f"{what}: expected numbers, got {value!r:.100}") from None
     if array.ndim == 0 or array.shape[-1] not in widths or array.size == 0:
@@ -31,7 +79,7 @@ def coordinates(value: ArrayLike, what: str, *widths: int) -> Array:
 def checked_numbers(value: ArrayLike, what: str, least: float = -np.inf) -> Array:
     """Finite numbers (...) >= `least`. Raises InputError."""
     try:
-        array = np.asarray(value, dtype=np.float64)
+        array = real_array(value)
     except (TypeError, ValueError, OverflowError):
         raise InputError(f"{what}: expected numbers, got {value!r:.100}") from None
     if not np.isfinite(array).all() or (array < least).any():
@@ -56,6 +104,8 @@ def triangles(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> tupl
     points = point_set(vertices, f"{what} vertices", 3, least=3)
     try:
         indices = np.asarray(faces)
+        if hides_some(faces):
+            raise TypeError
     except (TypeError, ValueError, OverflowError):
         raise ShapeError(f"{what} faces: expected integers of shape (m, 3), got {type(faces).__name__}") from None
     if indices.ndim != 2 or indices.shape[1] != 3 or len(indices) == 0 or not np.issubdtype(indices.dtype, np.integer):

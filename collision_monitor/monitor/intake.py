@@ -12,6 +12,7 @@ from collision_monitor import records
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor.errors import InputError, Refusal
+from collision_monitor.geometry.coordinates import hides_some, real_array
 from collision_monitor.monitor.refusals import Refusals, some_ids
 from collision_monitor.monitor.state.roster import Roster
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
@@ -107,6 +108,8 @@ class Intake(Stage):
         """
         try:
             given = np.asarray(ids)
+            if hides_some(ids):
+                raise ValueError
         except ValueError:
             raise InputError(f"ids: expected one dimension of integers, got {ids!r}") from None
         if given.size == 0:
@@ -118,7 +121,7 @@ class Intake(Stage):
         if covariance is None:
             return states, np.empty((0, 12))
         try:
-            covariances = np.asarray(covariance, dtype=np.float64)
+            covariances = real_array(covariance)
         except (TypeError, ValueError, OverflowError):
             raise InputError("covariance: expected an array of numbers") from None
         if covariances.shape != (len(states), 12):
@@ -253,8 +256,8 @@ def _states(ids: NDArray[Any], poses: Any, twists: Any) -> States:
     if ids.ndim != 1 or not np.issubdtype(ids.dtype, np.integer):
         raise InputError(f"ids: expected one dimension of integers, got {ids.dtype} of shape {ids.shape}")
     try:
-        pose = np.asarray(poses, dtype=np.float64)
-        twist = np.zeros((len(ids), 6)) if twists is None else np.asarray(twists, dtype=np.float64)
+        pose = real_array(poses)
+        twist = np.zeros((len(ids), 6)) if twists is None else real_array(twists)
     except (TypeError, ValueError, OverflowError):
         raise InputError("poses and twists: expected arrays of numbers") from None
     n = len(ids)

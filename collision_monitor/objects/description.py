@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from collision_monitor.errors import InputError, ShapeError
+from collision_monitor.geometry.coordinates import real_number
 from collision_monitor.records import Model
 from collision_monitor.shapes.compound import shape_pairs
 from collision_monitor.shapes.pose import Pose
@@ -39,7 +40,7 @@ def _uint32(value: Any, what: str) -> int:
 
 def _not_negative(value: Any, what: str, unit: str) -> float:
     try:
-        number = float(value)
+        number = real_number(value)
     except (TypeError, ValueError, OverflowError):
         raise InputError(f"{what}: expected a number of {unit}, got {value!r}") from None
     if not 0.0 <= number <= LARGEST_INPUT:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from collision_monitor.errors import InputError, PoseError
+from collision_monitor.geometry.coordinates import real_number
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Shape
 
@@ -20,7 +21,7 @@ Compound = Shape | Sequence[tuple[Shape, Pose]]
 def finite_number(name: str, value: Any, positive: bool = False) -> float:
     """Return a finite float >= 0, or > 0 if `positive`. Raises InputError."""
     try:
-        result = float(value)
+        result = real_number(value)
     except (TypeError, ValueError, OverflowError):
         result = math.nan
     if not (math.isfinite(result) and (result > 0.0 if positive else result >= 0.0)):

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import InputError, PoseError, ShapeError
+from collision_monitor.geometry.coordinates import real_array
 from collision_monitor.query.arguments import Compound
 from collision_monitor.query.packed import packed_shape
 from collision_monitor.shapes.pose import Pose
@@ -91,7 +92,7 @@ def pose_of(row: Array) -> Pose:
 def number_rows(value: Any, width: int, name: str) -> Array:
     """Copy of an array (N, width) of finite numbers; one row may lack its dimension. Raises InputError, PoseError."""
     try:
-        rows = np.atleast_2d(np.array(value, dtype=np.float64))
+        rows = np.atleast_2d(np.array(real_array(value)))
     except (TypeError, ValueError):
         raise InputError(f"{name}: expected numbers (N, {width}), got {type(value).__name__}") from None
     if rows.ndim != 2 or rows.shape[1] != width:

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.coordinates import Array, checked_numbers, coordinates
+from collision_monitor.geometry.coordinates import Array, checked_numbers, coordinates, real_array
 from collision_monitor.tolerances import LARGEST_INPUT
 
 
@@ -50,7 +50,7 @@ def restitutions(value: ArrayLike) -> Array:
 def masses(value: ArrayLike, name: str = "mass") -> Array:
     """Masses (..., 1) in kg, positive; infinity is an immovable body. Raises InputError."""
     try:
-        array = np.asarray(value, dtype=np.float64)
+        array = real_array(value)
     except (TypeError, ValueError):
         raise InputError(f"{name}: expected numbers of kilograms, got {value!r:.100}") from None
     if not (array > 0.0).all():

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.errors import InputError, PoseError
+from collision_monitor.geometry.coordinates import real_array
 from collision_monitor.impact.body_impact import ImpactQuery, make_scratch
 from collision_monitor.impact.impact_record import IMPACT
 from collision_monitor.query.arguments import Compound
@@ -149,7 +150,7 @@ def _states(poses: ArrayLike, twists: ArrayLike, name: str) -> Array:
     columns = []
     for value, width, what in ((poses, 7, "poses"), (twists, 6, "twists")):
         try:
-            array = np.atleast_2d(np.asarray(value, dtype=np.float64))
+            array = np.atleast_2d(real_array(value))
         except (TypeError, ValueError):
             raise InputError(f"{what} {name}: expected numbers (N, {width}), got {type(value).__name__}") from None
         if array.ndim != 2 or array.shape[1] != width:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.errors import ShapeError, UnsupportedError
 from collision_monitor.geometry.contact_features import Feature, mesh_feature_at
+from collision_monitor.geometry.coordinates import hides_some
 from collision_monitor.geometry.inside import locate_in_welded_surface
 from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.polyhedra import is_closed
@@ -43,6 +44,8 @@ class Mesh(Shape):
         vertices = point_rows(self.vertices, "Mesh vertices", 3, 3)
         try:
             faces = np.array(self.faces)
+            if hides_some(self.faces):
+                raise TypeError
         except (TypeError, ValueError, OverflowError):
             got = type(self.faces).__name__
             raise ShapeError(f"Mesh faces: expected an array of shape (m, 3), got {got}") from None
