@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from collision_monitor.errors import ShapeError
-from collision_monitor.geometry.coordinates import Array, Indices, point_set
+from collision_monitor.geometry.coordinates import Array, Booleans, Indices, point_set
 from collision_monitor.geometry.orientation import orient2d, orient3d
 
 MOST_POINTS: Final = 10_000
@@ -149,7 +149,7 @@ def _ring(points: Array) -> Indices:
     raise ShapeError("gift wrapping: expected a ring of corners, got none")  # exact turns always close
 
 
-def _on_line(a: Array, b: Array, points: Array) -> Array:
+def _on_line(a: Array, b: Array, points: Array) -> Booleans:
     """Return whether points (n, 2 or 3) are on the line through a and b, exactly."""
     pairs = [[0, 1]] if points.shape[1] == 2 else [[0, 1], [1, 2], [2, 0]]
     turns = [np.asarray(orient2d(a[pair], b[pair], points[:, pair])) == 0.0 for pair in pairs]
