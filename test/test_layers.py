@@ -39,7 +39,10 @@ FLOORS: Final = (
 
 SIDEWAYS: Final = {
     ("sources.importing", "session"): "what a bag is imported into is a session",
-    ("sources.bag_limits", "session"): "the chunks of a bag have the limits of those of a session",
+    ("sources.bag", "session"): "a bag of MCAP is known by its first bytes",
+    ("sources.storage.mcap_storage", "session"): "a bag of MCAP has the records of a session",
+    ("sources.storage.packed", "session"): "what is packed in a bag has the limits of the chunks of a session",
+    ("sources.storage.ros1_storage", "session"): "likewise",
 }
 """Allowed imports of a module from another folder of the same floor, with the reason."""
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import fnmatch
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, Self
@@ -15,6 +15,7 @@ from typing import Final, Self
 from collision_monitor.alerts.protective_separation import ProtectiveSeparation, read_protective_separation
 from collision_monitor.alerts.thresholds import FROM_ANSWERS, LEVELS, Thresholds, read_levels
 from collision_monitor.alerts.zones import Zone, read_zone
+from collision_monitor.errors import InputError
 from collision_monitor.settings.yaml_entry import YamlEntry
 from collision_monitor.settings.yaml_file import read_text
 
@@ -23,6 +24,22 @@ ANY: Final = "any"
 
 MOST: Final = 100
 """Rules, classes, zones, patterns of a class and allowed pairs of a file: a step evaluates each of them."""
+
+MOST_PATTERNS: Final = 1000
+"""Members of all classes of a file together."""
+
+MOST_WILDCARDS: Final = 2000
+"""Of `*`, `?` and `[` in all of them."""
+
+LONGEST_PATTERN: Final = 256
+"""Characters of a member. A name has 256 bytes at most."""
+
+LARGEST: Final = 1 << 16
+"""Bytes of a text. One hundred rules have 10 KB. The limits keep reading below 100 ms, in which a running monitor is
+silent."""
+
+_VALUES: Final = 5000
+"""Values in a text: one hundred rules have 2,000."""
 
 _RULE: Final = (
     *("between", *LEVELS, "raise_after", "clear_after", "quiet_at_rest", "quiet_when_parting"),
@@ -99,14 +116,18 @@ class Rules:
         """
         if not text.strip():
             return cls()
-        top = YamlEntry.of_text(text, file).table(("classes", "allowed", "zones", "rules"))
+        if (size := len(text.encode("utf-8", "surrogatepass"))) > LARGEST:
+            raise InputError(f"{file}: expected rules of at most {LARGEST} bytes, got {size}")
+        entry = YamlEntry.of_text(text, file, _VALUES)
+        top = entry.table(("classes", "allowed", "zones", "rules"))
         found = {} if "classes" not in top else _bounded(top["classes"])
+        _check_members(found.values())
         classes = {name: _read_class(name, each) for name, each in found.items()}
         zones = {} if "zones" not in top else {name: read_zone(each) for name, each in _bounded(top["zones"]).items()}
         pairs = top["allowed"].items(most=MOST) if "allowed" in top else []
         allowed = tuple(_read_pair(each, classes) for each in pairs)
         if "rules" not in top:
-            raise YamlEntry.of_text(text, file).error("a table `rules`", f"{', '.join(top) or 'none'}")
+            raise entry.error("a table `rules`", f"{', '.join(top) or 'none'}")
         rules = tuple(_read_rule(name, each, classes, zones) for name, each in _bounded(top["rules"]).items())
         return cls(text, classes, allowed, zones, rules)
 
@@ -116,7 +137,22 @@ class Rules:
         brace. Raises InputError."""
         if "\n" in value or "{" in value:
             return cls.parse(value)
-        return cls.parse(read_text(Path(value)), value) if value else cls()
+        return cls.parse(read_text(Path(value), LARGEST), value) if value else cls()
+
+
+def _check_members(classes: Iterable[YamlEntry]) -> None:
+    """Compare the members of all classes with the limits, before one of them is compiled. Raises InputError."""
+    members = wildcards = 0
+    for each in classes:
+        for member in each.items(1, MOST):
+            members += 1
+            if isinstance(member.value, str):
+                wildcards += sum(map(member.value.count, "*?["))
+                if len(member.value) > LONGEST_PATTERN:
+                    raise member.error(f"a name of at most {LONGEST_PATTERN} characters", f"{len(member.value)}")
+            if members > MOST_PATTERNS or wildcards > MOST_WILDCARDS:
+                limits = f"at most {MOST_PATTERNS} members of all classes with {MOST_WILDCARDS} of * ? [ together"
+                raise member.error(limits, "more")
 
 
 def _bounded(entry: YamlEntry) -> dict[str, YamlEntry]:

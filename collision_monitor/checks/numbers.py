@@ -21,6 +21,44 @@ MOST_WHOLE = 2**31
 """Larger whole numbers become this one: none of what they count, such as iterations, goes that far."""
 
 
+_NUMBERS = "biuf"
+"""Kinds of NumPy's types whose values are numbers. Others convert too, but lose a part (complex) or a unit (times)."""
+
+
+def real_array(value: Any) -> Array:
+    """Return the numbers of an array, a list or the like as float64; a copy only if it has to be one.
+
+    Raises TypeError, ValueError or OverflowError for anything else: also for complex numbers, texts and times, and for
+    a masked array that hides some of its numbers, which NumPy would convert in silence.
+    """
+    if type(value) is np.ndarray and value.dtype == np.float64:
+        return value
+    parts = value if isinstance(value, list | tuple) else (value,)
+    if any(map(hides_some, parts)):
+        raise TypeError("numbers are masked")
+    array = np.asarray(value)
+    if array.dtype.kind == "O" and not any(isinstance(each, str | bytes | complex) for each in array.flat):
+        return array.astype(np.float64)  # Fraction, Decimal and the like
+    if array.dtype.kind not in _NUMBERS:
+        raise TypeError(f"expected numbers, got {array.dtype}")
+    return np.asarray(array, np.float64)
+
+
+def hides_some(value: Any) -> bool:
+    """Whether a value is a masked array that hides some of its elements."""
+    if not isinstance(value, np.ma.MaskedArray):
+        return False
+    return bool(np.ascontiguousarray(np.ma.getmaskarray(value)).view(np.bool_).any())
+
+
+def real_number(value: Any) -> float:
+    """Return one number. Raises TypeError, ValueError or OverflowError for anything else, as `real_array` does."""
+    kind = type(value)
+    if kind is float or kind is int or kind is np.float64:
+        return float(value)
+    return float(real_array(value))
+
+
 def checked_number(
     value: Any,
     what: str,
@@ -33,7 +71,7 @@ def checked_number(
 ) -> float:
     """Return a finite number from `least` to `most`, larger than `least` if `above`. Raises `error`."""
     try:
-        number = float(value)
+        number = real_number(value)
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not (math.isfinite(number) and least <= number <= most and not (above and number == least)):
@@ -76,7 +114,7 @@ def checked_whole(value: Any, what: str) -> int:
 def as_numbers(value: Any, what: str, expected: str = "numbers", error: Error = InputError) -> Array:
     """Return a float64 array (...), which may share memory with `value`. Raises `error` for what is no such array."""
     try:
-        return np.asarray(value, dtype=np.float64)
+        return real_array(value)
     except (TypeError, ValueError, OverflowError):
         raise error(f"{what}: expected {expected}, got {value!r:.100}") from None
 

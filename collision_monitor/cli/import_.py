@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collision_monitor.sources import Imported
 
 DESCRIPTION = """\
-Make a session from a ROS bag, and let the monitor answer it. The bag may hold odometry, poses, tf,
+Make a session from a bag of ROS 2 or ROS 1, and let the monitor answer it. The bag may hold odometry, poses, tf,
 footprints, tracks, detections, markers and scans. A mapping file, which is the sources file of the
 live node, gives the topic and the shape of each object:
 
@@ -58,7 +58,9 @@ def add_parser(subparsers: Any) -> None:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("bag", type=Path, metavar="BAG", help=".mcap or .db3 file, or the folder of a bag")
+    parser.add_argument(
+        "bag", type=Path, metavar="BAG", help=".mcap, .db3 or .bag (ROS 1) file, or the folder of a bag"
+    )
     parser.add_argument("--map", type=Path, metavar="FILE", help="mapping file (YAML)")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT", help="new session (.mcap)")
     parser.add_argument(

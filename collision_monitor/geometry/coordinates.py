@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from collision_monitor.checks.numbers import as_numbers
+from collision_monitor.checks.numbers import as_numbers, hides_some
 from collision_monitor.errors import InputError, ShapeError
 
 Array = NDArray[np.float64]
@@ -42,6 +42,8 @@ def triangles(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> tupl
     points = point_set(vertices, f"{what} vertices", 3, least=3)
     try:
         indices = np.asarray(faces)
+        if hides_some(faces):
+            raise TypeError
     except (TypeError, ValueError, OverflowError):
         raise ShapeError(f"{what} faces: expected integers of shape (m, 3), got {type(faces).__name__}") from None
     if indices.ndim != 2 or indices.shape[1] != 3 or len(indices) == 0 or not np.issubdtype(indices.dtype, np.integer):

@@ -32,9 +32,7 @@ def _better(builder: Any, value: Any, index: Any, other_value: Any, other_index:
 
 
 @intrinsic  # type: ignore[untyped-decorator]
-def farthest_vertex(
-    typing_context: Any, vertices: Any, start: Any, count: Any, dx: Any, dy: Any, dz: Any
-) -> Any:
+def farthest_vertex(typing_context: Any, vertices: Any, start: Any, count: Any, dx: Any, dy: Any, dz: Any) -> Any:
     """Index of the first vertex with the greatest d.v among `count` columns of vertices (3, V) from `start` on.
 
     count is a positive multiple of LANES, to which the shape table pads it.

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from collision_monitor import records
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor._jit.direct import direct
-from collision_monitor.checks.numbers import as_numbers
+from collision_monitor.checks.numbers import as_numbers, hides_some
 from collision_monitor.errors import InputError, Refusal
 from collision_monitor.monitor.refusals import Refusals, some_ids
 from collision_monitor.monitor.state.roster import Roster
@@ -108,6 +108,8 @@ class Intake(Stage):
         """
         try:
             given = np.asarray(ids)
+            if hides_some(ids):
+                raise ValueError
         except ValueError:
             raise InputError(f"ids: expected one dimension of integers, got {ids!r}") from None
         if given.size == 0:

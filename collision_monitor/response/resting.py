@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from collision_monitor.checks.numbers import checked_array
+from collision_monitor.checks.numbers import as_numbers, checked_array
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.coordinates import Array
 from collision_monitor.response.contact_set import Bodies, Contacts, solve
@@ -46,7 +46,7 @@ def hold_contacts(
     """
     count = len(contacts.a)
     contacts.check(len(bodies.inverse_mass))
-    start = np.zeros((count, 3)) if impulse is None else np.array(impulse, dtype=np.float64)
+    start = np.zeros((count, 3)) if impulse is None else np.array(as_numbers(impulse, "impulse"))
     if start.shape != (count, 3):
         raise InputError(f"impulse: expected shape ({count}, 3), one row for each contact, got {start.shape}")
     target, mu, budget = (

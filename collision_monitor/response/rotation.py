@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from collision_monitor.checks.numbers import checked_array
+from collision_monitor.checks.numbers import as_numbers, checked_array
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.coordinates import Array, coordinates
 from collision_monitor.response.checks import masses, restitutions, unit, vectors
@@ -75,7 +75,7 @@ def _at_point(body: RigidBody, point: Array, name: str) -> tuple[Array, Array, A
     )  # fmt: skip
     if any(array.shape[-1] != 3 for array in (v, w, x)):
         raise InputError(f"body {name}: expected vectors of space, shape (..., 3)")
-    mass, inertia = masses(body.mass, f"mass {name}"), np.asarray(body.inertia, dtype=np.float64)
+    mass, inertia = masses(body.mass, f"mass {name}"), as_numbers(body.inertia, f"inertia {name}")
     if inertia.shape[-2:] != (3, 3):
         raise InputError(f"inertia {name}: expected shape (..., 3, 3), got {inertia.shape}")
     movable = np.isfinite(mass)[..., None]

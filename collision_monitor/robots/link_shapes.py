@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.robots.mesh_location import FileLocator
 from collision_monitor.robots.urdf import Link
-from collision_monitor.robots.xml_tree import Element
+from collision_monitor.settings.xml_tree import Element
 from collision_monitor.shapes.mesh_file import load_mesh
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Box, Capsule, Cylinder, Mesh, Shape, Sphere

@@ -18,7 +18,8 @@ from collision_monitor.robots.mesh_location import FileLocator
 from collision_monitor.robots.srdf import Pair, disabled_pairs
 from collision_monitor.robots.touching_links import touching_links
 from collision_monitor.robots.urdf import parse_urdf
-from collision_monitor.robots.xml_tree import LARGEST_TEXT
+from collision_monitor.settings.regular_file import read_regular
+from collision_monitor.settings.xml_tree import LARGEST_TEXT
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Shape
 
@@ -38,12 +39,7 @@ class Description:
     @classmethod
     def read(cls, path: Path) -> Description:
         """Read a file. Raises InputError."""
-        try:
-            with path.open("rb") as file:
-                return cls(file.read(LARGEST_TEXT + 1), str(path), path.parent)
-        except (OSError, ValueError) as error:
-            reason = getattr(error, "strerror", None) or str(error)
-            raise InputError(f"{path}: expected a file that can be read, got: {reason}") from None
+        return cls(read_regular(path, most=LARGEST_TEXT), str(path), path.parent)
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-from collision_monitor.robots.xml_tree import Element, parse_xml
+from collision_monitor.settings.xml_tree import Element, parse_xml
 
 Pair = tuple[str, str]
 

@@ -9,7 +9,7 @@ from typing import Any, Self
 from collision_monitor.checks.numbers import checked_yaml_number
 from collision_monitor.errors import InputError
 from collision_monitor.settings.names import nearest_name
-from collision_monitor.settings.yaml_file import Keys, parse_yaml, value_lines
+from collision_monitor.settings.yaml_file import NODES, Keys, parse_yaml, value_lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,9 +22,9 @@ class YamlEntry:
     path: Keys = ()
 
     @classmethod
-    def of_text(cls, text: str, file: str) -> Self:
-        """Parse YAML. file: its name, for errors."""
-        value = parse_yaml(text, file)
+    def of_text(cls, text: str, file: str, nodes: int = NODES) -> Self:
+        """Parse YAML. file: its name, for errors. nodes: most values."""
+        value = parse_yaml(text, file, nodes=nodes)
         return cls(value, file, value_lines(text))
 
     @property

@@ -15,6 +15,10 @@ class Decoder:
     """
 
     def __init__(self, definitions: dict[str, Any]) -> None:
+        self.use(definitions)
+
+    def use(self, definitions: dict[str, Any]) -> None:
+        """Decode by these definitions and those of Jazzy from now on."""
         from rosbags.typesys import Stores, get_typestore
 
         self._checked: set[str] = set()

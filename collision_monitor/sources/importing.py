@@ -168,7 +168,9 @@ def _remove(target: Path) -> None:
 
 def _feed_of(bag: Bag, mapping: Mapping) -> Feed:
     """Return a feed that knows the types of the bag's topics. Raises SessionError, InputError."""
-    feed = Feed(mapping, Decoder(bag.definitions))
+    decoder = Decoder({})
+    feed = Feed(mapping, decoder)
+    decoder.use(bag.definitions([*feed.wanted, *_transform_topics(bag)]))
     for topic, types in feed.wanted.items():
         if topic not in bag.topics:
             usable = [f"{name} ({each})" for name, each in sorted(bag.topics.items()) if each in BY_TYPE]
@@ -187,7 +189,7 @@ def _feed_of(bag: Bag, mapping: Mapping) -> Feed:
 
 def _mapped_inputs(bag: Bag, feed: Feed) -> Iterator[Input]:
     """Yield the inputs of the monitor. The static transforms of the whole bag hold from its start."""
-    topics = [topic for topic, kind in bag.topics.items() if kind == TRANSFORMS]
+    topics = _transform_topics(bag)
     static = [topic for topic in topics if topic.endswith(STATIC) and topic not in feed.mapping.topics]
     others = {*feed.wanted, *topics} - set(static)
     begun = False
@@ -199,7 +201,12 @@ def _mapped_inputs(bag: Bag, feed: Feed) -> Iterator[Input]:
             static = []
             _require_placed(feed)
         yield from feed.take(raw)
-    _require_placed(feed)
+    if begun:
+        _require_placed(feed)
+
+
+def _transform_topics(bag: Bag) -> list[str]:
+    return [topic for topic, kind in bag.topics.items() if kind == TRANSFORMS]
 
 
 def _require_placed(feed: Feed) -> None:

@@ -335,10 +335,10 @@ def test_what_is_no_bag_is_named(tmp_path: Path) -> None:
     (tmp_path / "x.csv").write_text("1,2")
     for name, text in {
         "none.mcap": "expected a bag, got nothing there",
-        "text.mcap": "expected a bag of rosbag2, cannot be read",
-        "empty.mcap": "expected a bag of rosbag2, cannot be read",
+        "text.mcap": "expected a bag, cannot be read",
+        "empty.mcap": "expected a bag, cannot be read",
         "folder": "without metadata.yaml",
-        "x.csv": "expected a bag of rosbag2, cannot be read",
+        "x.csv": "expected a bag, cannot be read",
     }.items():
         with pytest.raises(SessionError) as error:
             import_bag(tmp_path / name, tmp_path / "a.mcap", mapping)

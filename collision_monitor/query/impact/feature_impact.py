@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from collision_monitor._jit import allocating_kernel, device, inlined
-from collision_monitor.checks.numbers import checked_number, checked_whole
+from collision_monitor.checks.numbers import as_numbers, checked_number, checked_whole
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.vector import cross, dot
 from collision_monitor.tolerances import EPSILON, LARGEST_INPUT
@@ -104,10 +104,7 @@ def edge_edge_impact(
 
 
 def _impacts(x: ArrayLike, face: bool, separation: float, tolerance: float | None, budget: int) -> FeatureImpact:
-    try:
-        points = np.ascontiguousarray(x, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"x: expected numbers of shape (..., 8, 3), got {type(x).__name__}") from None
+    points = np.ascontiguousarray(as_numbers(x, "x"))
     if points.ndim < 2 or points.shape[-2:] != (8, 3):
         raise InputError(f"x: expected four points at the start and at the end, (..., 8, 3), got shape {points.shape}")
     if not (np.abs(points) <= LARGEST_INPUT).all():

@@ -8,6 +8,7 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from collision_monitor.checks.numbers import as_numbers
 from collision_monitor.errors import InputError
 from collision_monitor.world.hard_spheres.event_loop import (
     DONE,
@@ -255,7 +256,7 @@ def _masses(radii: Floats) -> Floats:
 
 
 def _radii(radii: ArrayLike, count: int) -> Floats:
-    sizes = np.asarray(radii, dtype=np.float64)
+    sizes = as_numbers(radii, "radii")
     if sizes.shape not in ((), (count,)):
         raise InputError(f"radii: expected one number or {count} numbers, got an array of shape {sizes.shape}")
     if not (np.isfinite(sizes).all() and (sizes > 0.0).all()):
@@ -268,7 +269,7 @@ def _radii(radii: ArrayLike, count: int) -> Floats:
 
 
 def _rows(values: ArrayLike, name: str) -> Floats:
-    array = np.asarray(values, dtype=np.float64)
+    array = as_numbers(values, name)
     if array.ndim != 2 or array.shape[1] != 3 or not np.isfinite(array).all():
         raise InputError(f"{name}: expected an array (N, 3) of finite numbers, got shape {array.shape}")
     return array
