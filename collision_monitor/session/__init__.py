@@ -12,7 +12,7 @@ _HOME = {
     "ONE_FILE": "recording.splitting",
     "Recorded": "reader",
     "Recorder": "recording.recorder",
-    "Recording": "recording.recording_state",
+    "RecordingState": "recording.recording_state",
     "Session": "reader",
     "Splitting": "recording.splitting",
 }
