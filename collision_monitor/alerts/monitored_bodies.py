@@ -40,6 +40,11 @@ class MonitoredBodies:
             low, high = profile.region_min, profile.region_max
             self.present &= bodies_in(b, top, now, low, high, profile.stale_acceleration)
 
+    def speed_within(self, horizon: float) -> Array:
+        """Return a bound (N,) on the speed (m/s) of any point until `horizon` (s) from now, as the states declare."""
+        later = self.velocity + self.roster.bodies.acceleration[: self.roster.top] * horizon
+        return np.asarray(np.maximum(self.speed, np.sqrt((later**2).sum(axis=1)) + self.turning))
+
     def velocity_at(self, slots: Slots, points: Array) -> Array:
         """Velocity (m/s) of points (n, 3) of these bodies."""
         return np.asarray(self.velocity[slots] + np.cross(self.angular[slots], points - self.position[slots]))

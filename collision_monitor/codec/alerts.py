@@ -6,6 +6,16 @@ from dataclasses import dataclass, fields
 from enum import IntEnum
 from typing import Any, Final
 
+from collision_monitor.codec.alert_coverage import (
+    LEAST_COVERAGE,
+    LEAST_UNMONITORED,
+    RuleCoverage,
+    UnmonitoredObject,
+    read_coverage,
+    read_unmonitored,
+    write_coverage,
+    write_unmonitored,
+)
 from collision_monitor.codec.cdr import Buffer, Reader, Writer, write_header
 
 Point = tuple[float, float, float]
@@ -46,6 +56,7 @@ class CollisionAlert:
     distance: float
     distance_error: float
     closing_speed: float
+    impact_speed: float
     time_to_closest_approach: float
     distance_at_closest_approach: float
     required_deceleration: float
@@ -81,6 +92,9 @@ class CollisionAlertArray:
     number: int
     highest: int
     alerts: tuple[CollisionAlert, ...]
+    monitor: int = 0
+    rules: tuple[RuleCoverage, ...] = ()
+    unmonitored: tuple[UnmonitoredObject, ...] = ()
 
 
 def decode_alert(data: Buffer) -> CollisionAlert:
@@ -104,8 +118,11 @@ def decode_alerts(data: Buffer) -> CollisionAlertArray:
     head = reader.stamp_ns(), reader.string("header.frame_id")
     numbers = reader.scalar("u8", "step"), reader.scalar("u8", "number"), reader.scalar("u1", "highest")
     alerts = tuple(_read(reader) for _ in range(reader.count(LEAST_BYTES, "alerts")))
+    monitor = reader.scalar("u8", "monitor")
+    rules = tuple(read_coverage(reader) for _ in range(reader.count(LEAST_COVERAGE, "rules")))
+    unmonitored = tuple(read_unmonitored(reader) for _ in range(reader.count(LEAST_UNMONITORED, "unmonitored")))
     reader.finish()
-    return CollisionAlertArray(*head, *numbers, alerts)
+    return CollisionAlertArray(*head, *numbers, alerts, monitor, rules, unmonitored)
 
 
 def encode_alerts(array: CollisionAlertArray) -> bytes:
@@ -118,6 +135,13 @@ def encode_alerts(array: CollisionAlertArray) -> bytes:
     writer.scalar("u4", len(array.alerts), "alerts")
     for alert in array.alerts:
         _write(writer, alert)
+    writer.scalar("u8", array.monitor, "monitor")
+    writer.scalar("u4", len(array.rules), "rules")
+    for rule in array.rules:
+        write_coverage(writer, rule)
+    writer.scalar("u4", len(array.unmonitored), "unmonitored")
+    for each in array.unmonitored:
+        write_unmonitored(writer, each)
     return writer.finish()
 
 
