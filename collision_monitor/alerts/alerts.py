@@ -16,6 +16,7 @@ from collision_monitor.alerts.monitored_bodies import MonitoredBodies
 from collision_monitor.alerts.rules import Rule, Rules
 from collision_monitor.alerts.selection import Classes
 from collision_monitor.codec.alerts import AlertCause, CollisionAlert, CollisionAlertArray
+from collision_monitor.impact.body_impact import make_scratch
 from collision_monitor.impact.impact_record import ids_of_keys
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
@@ -42,6 +43,7 @@ class Alerts:
         self._last: list[int] | None = None  # stamp (ns) of the last step, and number of restarts of the timeline
         self._raised: dict[tuple[str, int, int], CollisionAlert] = {}
         self._measured: dict[str, Measures] = {}  # by each rule in the last step
+        self._scratch = make_scratch()
 
     def use(self, rules: Rules) -> None:
         """Use these rules from the next step on. The alerts of a rule whose name stays go on; the others end."""
@@ -80,7 +82,7 @@ class Alerts:
         """Return the alerts that a step changes, by rule and pair. Without rules this costs nothing."""
         if not (self.rules.rules or self._gone):
             return []
-        scene = MonitoredBodies(monitor.roster, monitor.profile, monitor.now)
+        scene = MonitoredBodies(monitor.roster, monitor.profile, monitor.now, self._scratch)
         if self._is_outdated:
             self._classes.update(monitor.roster)
             self._is_outdated = False
