@@ -245,7 +245,7 @@ CALLS: dict[str, Call] = {
     "Detector": lambda g: _detector(g, 1),
     "Detector on two threads": lambda g: _detector(g, 2),
     "codec": lambda g: codec.encode_contacts(
-        0, "world", 1, np.zeros(2, CONTACT), np.arange(3, dtype=np.uint32), [f"cart_{k}" for k in g.integers(99, size=3)]
+        0, "world", 1, np.zeros(2, CONTACT), np.arange(3, dtype=np.uint32), [f"c_{k}" for k in g.integers(99, size=3)]
     ),
     "response.reflect": lambda g: response.reflect(*_vectors(g, 2)),
     "response.clamp": lambda g: response.clamp(*_vectors(g, 2)),
