@@ -36,11 +36,16 @@ def evaluate_rule(
         found = _with_near(rules, rule, classes, scene, found, raised)
         _measure(rule, classes, scene, found)
     found.uncertain |= scene.stale[found.i] | scene.stale[found.j]
-    level = np.zeros(len(found), np.uint8)
+    found.reached = _levels(rule, found)
     found.quiet = quiet_pairs(rule, scene, found)
+    return found, _levels(rule, found)
+
+
+def _levels(rule: Rule, found: Measures) -> NDArray[np.uint8]:
+    level = np.zeros(len(found), np.uint8)
     for each in rule.levels:
         level[each.met(found)] = each.level
-    return found, level
+    return level
 
 
 def _with_near(

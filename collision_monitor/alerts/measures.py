@@ -26,7 +26,7 @@ class Measures:
     keys (n,): of the pairs (`pair_key`), ascending. i, j (n,): their body slots; i has the smaller id. points
     (n, 2, 3): nearest points of both in m. uncertain (n,): the monitor could not settle the pair, or a state of it is
     stale. is_certain_hit (n,): it is predicted to collide with certainty. quiet: by measure, which pairs (n,) its
-    thresholds leave out.
+    thresholds leave out. reached (n,): the highest level whose thresholds are passed, also where they leave pairs out.
     """
 
     def __init__(self, keys: NDArray[np.uint64], i: Slots, j: Slots) -> None:
@@ -35,6 +35,7 @@ class Measures:
         self.uncertain = np.zeros(len(keys), np.bool_)
         self.is_certain_hit = np.zeros(len(keys), np.bool_)
         self.quiet: Mapping[str, NDArray[np.bool_]] = {}
+        self.reached = np.zeros(len(keys), np.uint8)
         self._columns = {name: np.full(len(keys), np.nan) for name in COLUMNS}
         self["time_to_collision"] = self["time_to_collision_upper"] = np.full(len(keys), np.inf)
         self["probability"] = np.zeros(len(keys))
@@ -53,7 +54,7 @@ class Measures:
         taken = Measures.__new__(Measures)
         taken.keys, taken.i, taken.j = self.keys[which], self.i[which], self.j[which]
         taken.points, taken.uncertain = self.points[which], self.uncertain[which]
-        taken.is_certain_hit = self.is_certain_hit[which]
+        taken.is_certain_hit, taken.reached = self.is_certain_hit[which], self.reached[which]
         taken.quiet = {name: mask[which] for name, mask in self.quiet.items()}
         taken._columns = {name: column[which] for name, column in self._columns.items()}
         return taken

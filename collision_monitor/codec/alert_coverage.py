@@ -25,14 +25,14 @@ class RuleCoverage:
     against: str
     ids: NDArray[np.uint32]
     reach: float
-    delay: float
+    ahead: float
     unfit: str
 
     def __eq__(self, other: object) -> bool:
         """Compare all fields."""
         if not isinstance(other, RuleCoverage):
             return NotImplemented
-        mine, theirs = ((o.rule, o.against, o.reach, o.delay, o.unfit, o.ids.tolist()) for o in (self, other))
+        mine, theirs = ((o.rule, o.against, o.reach, o.ahead, o.unfit, o.ids.tolist()) for o in (self, other))
         return mine == theirs
 
     __hash__ = None  # type: ignore[assignment]
@@ -46,32 +46,33 @@ class UnmonitoredObject:
     reason: str
     since_ns: int
     is_silent: bool = False
-    rules: tuple[str, ...] = ()
+    coverage: tuple[int, ...] = ()
 
 
 def read_coverage(reader: Reader) -> RuleCoverage:
     """Read a RuleCoverage. Raises MessageError."""
-    rule, against = reader.string("rules.rule"), reader.string("rules.against")
-    ids = reader.sequence(np.uint32, 4, "rules.ids")
-    reach, delay = reader.scalar("f8", "rules.reach"), reader.scalar("f8", "rules.delay")
-    return RuleCoverage(rule, against, ids, reach, delay, reader.string("rules.unfit"))
+    rule, against = reader.string("coverage.rule"), reader.string("coverage.against")
+    ids = reader.sequence(np.uint32, 4, "coverage.ids")
+    reach, ahead = reader.scalar("f8", "coverage.reach"), reader.scalar("f8", "coverage.ahead")
+    return RuleCoverage(rule, against, ids, reach, ahead, reader.string("coverage.unfit"))
 
 
 def write_coverage(writer: Writer, rule: RuleCoverage) -> None:
     """Write a RuleCoverage. Raises MessageError."""
-    writer.string(rule.rule, "rules.rule")
-    writer.string(rule.against, "rules.against")
+    writer.string(rule.rule, "coverage.rule")
+    writer.string(rule.against, "coverage.against")
     writer.sequence(rule.ids, np.uint32, 4)
-    writer.scalar("f8", rule.reach, "rules.reach")
-    writer.scalar("f8", rule.delay, "rules.delay")
-    writer.string(rule.unfit, "rules.unfit")
+    writer.scalar("f8", rule.reach, "coverage.reach")
+    writer.scalar("f8", rule.ahead, "coverage.ahead")
+    writer.string(rule.unfit, "coverage.unfit")
 
 
 def read_unmonitored(reader: Reader) -> UnmonitoredObject:
     """Read an UnmonitoredObject. Raises MessageError."""
     name, reason = reader.string("unmonitored.name"), reader.string("unmonitored.reason")
     since_ns, is_silent = reader.stamp_ns(), reader.boolean("unmonitored.is_silent")
-    return UnmonitoredObject(name, reason, since_ns, is_silent, tuple(reader.strings("unmonitored.rules")))
+    coverage = reader.sequence(np.uint32, 4, "unmonitored.coverage")
+    return UnmonitoredObject(name, reason, since_ns, is_silent, tuple(coverage.tolist()))
 
 
 def write_unmonitored(writer: Writer, each: UnmonitoredObject) -> None:
@@ -80,4 +81,4 @@ def write_unmonitored(writer: Writer, each: UnmonitoredObject) -> None:
     writer.string(each.reason, "unmonitored.reason")
     writer.stamp_ns(each.since_ns)
     writer.scalar("u1", each.is_silent, "unmonitored.is_silent")
-    writer.strings(list(each.rules), "unmonitored.rules")
+    writer.sequence(np.array(each.coverage, np.uint32), np.uint32, 4)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from collision_monitor._version import VERSION
 from collision_monitor.alerts.alerts import Alerts
+from collision_monitor.alerts.missing_objects import MissingObject
 from collision_monitor.alerts.rules import Rules
 from collision_monitor.codec import (
     Change,
@@ -226,16 +227,20 @@ class Pipeline:
         """Whether any alert is raised."""
         return self._alerts.has_raised
 
-    def raised_alerts(self) -> bytes:
-        """Return a CollisionAlertArray of all alerts that are raised, with the measures of the last step."""
+    def raised_alerts(self, missing: Iterable[MissingObject] = (), number: int = 0) -> bytes:
+        """Return a CollisionAlertArray of all alerts that are raised, with the measures of the last step.
+
+        missing: what is asked for and not monitored. number: of the monitor, for guards.
+        """
         last = self.monitor.last
         stamp_ns, step = (last.stamp_ns, last.step) if last is not None else (0, 0)
-        return encode_alerts(self._alerts.raised(stamp_ns, self.frame_id, step))
+        raised = self._alerts.raised(stamp_ns, self.frame_id, step)
+        return encode_alerts(self._alerts.for_guards(raised, self.monitor, missing, number))
 
     @property
     def empty_classes(self) -> list[str]:
-        """The classes of the rules that no object belongs to, as of the last step."""
-        return self._alerts.empty_classes
+        """The classes of the rules that no object belongs to."""
+        return self._alerts.empty_classes(self.monitor.roster)
 
     # -- what the monitor says of its inputs
 

@@ -118,12 +118,14 @@ def test_alerts(seed: int) -> None:
         assert codec.encode_alert(ours) == codec.encode_alert(codec.decode_alert(serialize_message(theirs)))
         names = [name for name in theirs.get_fields_and_field_types() if name not in ("header", "since")]
         assert [flat(getattr(ours, name)) for name in names] == [flat(getattr(theirs, name)) for name in names]
-    for ours, theirs in zip(it.rules, message.rules, strict=True):
+    assert [flat_record(each) for each in it.held_back] == [flat(each) for each in message.held_back]
+    assert list(it.rule_names) == message.rule_names
+    for ours, theirs in zip(it.coverage, message.coverage, strict=True):
         assert flat(list(vars(ours).values())) == flat(theirs)
     for ours, theirs in zip(it.unmonitored, message.unmonitored, strict=True):
         expected = theirs.name, theirs.reason, theirs.since.sec * 10**9 + theirs.since.nanosec, theirs.is_silent
         assert (ours.name, ours.reason, ours.since_ns, ours.is_silent) == expected
-        assert list(ours.rules) == theirs.rules
+        assert list(ours.coverage) == list(theirs.coverage)
     assert deserialize_message(codec.encode_alerts(it), msg.CollisionAlertArray) == message
 
 
