@@ -105,7 +105,8 @@ class Alerts:
     def _scene(self, monitor: Monitor) -> MonitoredBodies:
         """Return the bodies now, with the classes of all of them known."""
         self._update_classes(monitor.roster)
-        return MonitoredBodies(monitor.roster, monitor.profile, monitor.now, self._scratch)
+        now = 0.0 if monitor.last is None else monitor.now
+        return MonitoredBodies(monitor.roster, monitor.profile, now, self._scratch)
 
     def _update_classes(self, roster: Roster) -> None:
         if self._is_outdated:

@@ -22,7 +22,8 @@ MOST: Final = 100
 
 
 class MissingObject(NamedTuple):
-    """Something that is asked for and not there. name: of the object, or with which names of its objects begin.
+    """Something that is asked for and not there. name: of the object, or with which names of its objects begin; empty:
+    further ones, which may be any.
 
     reason: for people. since_ns: when that began.
     """
@@ -68,6 +69,9 @@ def unmonitored_objects(
     listed = set()
     for each in missing:
         listed.add(each.name)
+        if not each.name:
+            found.append(UnmonitoredObject("", each.reason, each.since_ns, False, tuple(range(len(coverage)))))
+            continue
         object_id = described.get(each.name)
         names = (
             {name for name, one in rules.classes.items() if may_belong(one, each.name)}

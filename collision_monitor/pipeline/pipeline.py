@@ -18,6 +18,7 @@ from collision_monitor.alerts.missing_objects import MissingObject
 from collision_monitor.alerts.rules import Rules
 from collision_monitor.codec import (
     Change,
+    CollisionAlertArray,
     MonitorStatus,
     encode_alert,
     encode_alerts,
@@ -228,14 +229,18 @@ class Pipeline:
         return self._alerts.has_raised
 
     def raised_alerts(self, missing: Iterable[MissingObject] = (), number: int = 0) -> bytes:
-        """Return a CollisionAlertArray of all alerts that are raised, with the measures of the last step.
+        """Return the bytes of `raised_alert_array`."""
+        return encode_alerts(self.raised_alert_array(missing, number))
 
-        missing: what is asked for and not monitored. number: of the monitor, for guards.
+    def raised_alert_array(self, missing: Iterable[MissingObject] = (), number: int = 0) -> CollisionAlertArray:
+        """Return all alerts that are raised, with the measures of the last step, and what guards need.
+
+        missing: what is asked for and not monitored. number: of the monitor.
         """
         last = self.monitor.last
         stamp_ns, step = (last.stamp_ns, last.step) if last is not None else (0, 0)
         raised = self._alerts.raised(stamp_ns, self.frame_id, step)
-        return encode_alerts(self._alerts.for_guards(raised, self.monitor, missing, number))
+        return self._alerts.for_guards(raised, self.monitor, missing, number)
 
     @property
     def empty_classes(self) -> list[str]:

@@ -12,7 +12,7 @@ _HOME = {
     "ONE_FILE": "recording.splitting",
     "Recorded": "reader",
     "Recorder": "recording.recorder",
-    "RecordingState": "recording.recording_state",
+    "Recording": "recording.recording_state",
     "Session": "reader",
     "Splitting": "recording.splitting",
 }
