@@ -44,13 +44,7 @@ def _in_force(rule: Rule, array: CollisionAlertArray, name_of: Callable[[int], s
     texts = [f"{each.name or 'others'}: {each.reason}" for each in missing]
     unfit = array.coverage[own[0]].unfit if own else ""
     values = {
-        "between": " and ".join(rule.between),
-        **{LEVELS[each.level - 1]: _thresholds(each.values) for each in rule.levels},
-        **{side: ", ".join(names) for side, names in (("inside", rule.inside), ("outside", rule.outside)) if names},
-        "raise_after [s]": f"{rule.raise_after * NANOSECOND:g}",
-        "clear_after [s]": f"{rule.clear_after * NANOSECOND:g}",
-        "quiet_at_rest": str(rule.quiet_at_rest).lower(),
-        "quiet_when_parting": str(rule.quiet_when_parting).lower(),
+        **rule_values(rule),
         "covers": "; ".join(covered) or "nobody",
         **({"not monitored": "; ".join(texts)} if texts else {}),
         **({"for a guard": unfit} if unfit else {}),
@@ -60,6 +54,19 @@ def _in_force(rule: Rule, array: CollisionAlertArray, name_of: Callable[[int], s
         summary += f"; not monitored: {'; '.join(islice(texts, 3))}"
         summary += f" and {len(texts) - 3} more" if len(texts) > 3 else ""
     return RuleInForce(rule.name, summary, bool(covered) and not texts, values)
+
+
+def rule_values(rule: Rule) -> dict[str, str]:
+    """Return the keys of a rule with their values in words, in the order to show them."""
+    return {
+        "between": " and ".join(rule.between),
+        **{LEVELS[each.level - 1]: _thresholds(each.values) for each in rule.levels},
+        **{side: ", ".join(names) for side, names in (("inside", rule.inside), ("outside", rule.outside)) if names},
+        "raise_after [s]": f"{rule.raise_after * NANOSECOND:g}",
+        "clear_after [s]": f"{rule.clear_after * NANOSECOND:g}",
+        "quiet_at_rest": str(rule.quiet_at_rest).lower(),
+        "quiet_when_parting": str(rule.quiet_when_parting).lower(),
+    }
 
 
 def _named(ids: Sequence[int], name_of: Callable[[int], str]) -> str:

@@ -269,6 +269,11 @@ class Pipeline:
         """Number of times that the timeline restarted because time jumped."""
         return self.monitor.restarts
 
+    @property
+    def has_begun(self) -> bool:
+        """Whether there was a step."""
+        return self.monitor.last is not None
+
     def stale(self) -> dict[int, str]:
         """Return the names of the objects that are stale at the latest time, by id."""
         return {object_id: self.monitor.name(object_id) for object_id in self.monitor.stale_ids}

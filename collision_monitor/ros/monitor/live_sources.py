@@ -17,6 +17,8 @@ from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.pipeline.topics import SOURCES
 from collision_monitor.ros.endpoints import message_class
 from collision_monitor.ros.health.line_report import DiagnosticLevel, LineReport
+from collision_monitor.ros.health.unmonitored_report import unmonitored_statuses
+from collision_monitor.ros.monitor.silent_topics import SilentTopics
 from collision_monitor.ros.names import is_topic_name
 from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.sources import Decoder, Feed, Input, Mapping, RawMessage, Unmonitored
@@ -46,6 +48,8 @@ class LiveSources:
         self._node, self._take, self._warn = node, take, warn
         self._mapping = mapping
         self._decoder = Decoder({})
+        self._silence = SilentTopics(mapping)
+        self._latched: set[str] = set()  # topics
         self._feed = Feed(mapping, self._decoder)
         # Transforms first: if several messages wait, the executor takes them in the order of the subscriptions.
         self._asked = self._feed.wanted  # the file names these topics; those of tf may be there besides
@@ -113,12 +117,11 @@ class LiveSources:
             self._feed.miss_topic(topic, f"no message on {topic} yet", self._now())
         for name, text in self._feed.bind(topic, kind).items():
             self._set_problem(name, text)
+        quality = quality_of_all(topic, infos)
+        if quality.durability is DurabilityPolicy.TRANSIENT_LOCAL:
+            self._latched.add(topic)
         self._node.create_subscription(
-            message,
-            resolved,
-            lambda data: self._on_message(topic, kind, data),
-            quality_of_all(topic, infos),
-            raw=True,
+            message, resolved, lambda data: self._on_message(topic, kind, data), quality, raw=True
         )
         self._node.get_logger().info(f"source {topic}: {kind}")
 
@@ -140,6 +143,7 @@ class LiveSources:
 
     def _on_message(self, topic: str, kind: str, data: bytes) -> None:
         self._messages[topic] = self._messages.get(topic, 0) + 1
+        self._silence.heard(topic, self._now())
         for each in self._feed.take(RawMessage(topic, kind, data, self._now())):
             self._take(each)
         for name, (count, text) in self._feed.scene.take_news().items():
@@ -152,8 +156,8 @@ class LiveSources:
 
     @property
     def unmonitored(self) -> tuple[Unmonitored, ...]:
-        """What the file asks for and is not monitored now, the oldest first."""
-        return self._feed.unmonitored
+        """What the file asks for and is not monitored now, the oldest first; then what fell silent."""
+        return *self._feed.unmonitored, *self._silence.rows(self._now(), self._latched)
 
     def lines(self) -> list[LineReport]:
         """Return what each line of the file does, in the order of the file; then the topics that it implies."""
@@ -196,6 +200,7 @@ class LiveSources:
                     level=bytes([line.level]), name=name, message=line.text, hardware_id="none", values=pairs
                 )
             )
+        array.status += unmonitored_statuses(self._node.get_name(), self.unmonitored, self._now())
         self._out.publish(array)
 
 

@@ -292,6 +292,7 @@ class Monitoring:
             self._log_silence(silent)
         if not silent:
             self._refusals.report_stale(self._states_in, now)
+        self._refusals.report_unseen(self._states_in, now)
         self._refusals.catch_up(now)
         if (profile := self._keeping_up.look(now)) is not None:
             self._use(profile)
@@ -349,6 +350,8 @@ class Monitoring:
             longest=self._times.longest,
             longest_step=self._times.longest_step,
             sources=None if self._sources is None else tuple(self._sources.lines()),
+            unmonitored=tuple(row.text for row in self._unmonitored()),
+            rules=self._alerts.report(),
         )
 
     def _now(self) -> int:
