@@ -9,6 +9,7 @@ import fnmatch
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Final, Self
 
@@ -49,17 +50,21 @@ _RULE: Final = (
 
 @dataclass(frozen=True)
 class ObjectClass:
-    """Objects by name, id or group. pattern: of the names; None: no name. groups: bits of ObjectDescription.group."""
+    """Objects by name, id or group. patterns: of the names. groups: bits of ObjectDescription.group."""
 
     name: str
-    pattern: re.Pattern[str] | None
+    patterns: tuple[str, ...]
     ids: frozenset[int]
     groups: int
 
     def has(self, object_id: int, name: str, group: int) -> bool:
         """Return whether an object belongs to the class."""
-        is_named = self.pattern is not None and self.pattern.match(name) is not None
+        is_named = self._pattern is not None and self._pattern.match(name) is not None
         return is_named or object_id in self.ids or bool(group & self.groups)
+
+    @cached_property
+    def _pattern(self) -> re.Pattern[str] | None:
+        return re.compile("|".join(map(fnmatch.translate, self.patterns))) if self.patterns else None
 
 
 @dataclass(frozen=True)
@@ -178,8 +183,8 @@ def _read_class(name: str, entry: YamlEntry) -> ObjectClass:
         elif isinstance(each.value, int):
             ids.add(_whole(each))
         else:
-            patterns.append(fnmatch.translate(each.text()))
-    return ObjectClass(name, re.compile("|".join(patterns)) if patterns else None, frozenset(ids), groups)
+            patterns.append(each.text())
+    return ObjectClass(name, tuple(patterns), frozenset(ids), groups)
 
 
 def _whole(entry: YamlEntry) -> int:

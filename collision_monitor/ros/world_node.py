@@ -17,7 +17,7 @@ from collision_monitor.errors import CollisionMonitorError
 from collision_monitor.pipeline.topics import NODE, Topic
 from collision_monitor.ros.endpoints import publisher, subscription
 from collision_monitor.ros.names import check_node_name
-from collision_monitor.ros.parameters import ParameterReader
+from collision_monitor.ros.parameters import ParameterReader, begin_node
 from collision_monitor.ros.process import WAKE_UP, StopRequest
 from collision_monitor.world import make_scene, scene_names
 from collision_monitor.world.rigid.response_choice import METHODS
@@ -38,7 +38,7 @@ class WorldNode(Node):
     """Publishes one scene to one monitor. Raises InputError for an impossible scene or parameter."""
 
     def __init__(self) -> None:
-        super().__init__("world", automatically_declare_parameters_from_overrides=True)
+        begin_node(self, "world")
         try:
             self._read_parameters()
         except CollisionMonitorError:

@@ -157,7 +157,7 @@ def lay_out_pair(a: MovingShape, b: MovingShape, horizon: float, apart: bool = F
     """
     count = len(a.pieces) + len(b.pieces)
     pieces = tuple(piece for moving in (a, b) for piece, _ in moving.pieces)
-    forest = _forest(pieces) if any(isinstance(piece, Mesh | Points) for piece in pieces) else None
+    forest = _forest(pieces).with_own_users() if any(isinstance(piece, Mesh | Points) for piece in pieces) else None
     builder = ShapeTableBuilder(slots=count, forest=forest)
     slots = [
         [builder.append(piece, pose, tree=shape_tree(piece) if forest else None) for piece, pose in moving.pieces]

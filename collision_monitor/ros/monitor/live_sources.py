@@ -17,9 +17,11 @@ from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.pipeline.topics import SOURCES
 from collision_monitor.ros.endpoints import message_class
 from collision_monitor.ros.health.line_report import DiagnosticLevel, LineReport
+from collision_monitor.ros.health.unmonitored_report import unmonitored_statuses
+from collision_monitor.ros.monitor.silent_topics import SilentTopics
 from collision_monitor.ros.names import is_topic_name
 from collision_monitor.session.mcap.definitions import definition
-from collision_monitor.sources import Decoder, Feed, Input, Mapping, RawMessage
+from collision_monitor.sources import Decoder, Feed, Input, Mapping, RawMessage, Unmonitored
 from collision_monitor.sources.messages.tf_objects import TRANSFORMS
 
 SEARCH_PERIOD: Final = 0.2
@@ -46,9 +48,12 @@ class LiveSources:
         self._node, self._take, self._warn = node, take, warn
         self._mapping = mapping
         self._decoder = Decoder({})
+        self._silence = SilentTopics(mapping)
+        self._latched: set[str] = set()  # topics
         self._feed = Feed(mapping, self._decoder)
         # Transforms first: if several messages wait, the executor takes them in the order of the subscriptions.
-        wanted = dict.fromkeys(_TF, (TRANSFORMS,)) | self._feed.wanted
+        self._asked = self._feed.wanted  # the file names these topics; those of tf may be there besides
+        wanted = dict.fromkeys(_TF, (TRANSFORMS,)) | self._asked
         for topic in (*wanted, *filter(None, [mapping.step_topic])):
             if not is_topic_name(topic):
                 text = f"expected a topic's name of letters, digits, underscores and slashes, got {topic!r}"
@@ -77,8 +82,10 @@ class LiveSources:
         """Subscribe to the topics that have a publisher by now."""
         for resolved in [name for name, (topic, _) in self._wanted.items() if topic not in self._found]:
             infos = self._node.get_publishers_info_by_topic(resolved)
+            topic, types = self._wanted[resolved]
+            if not infos and topic in self._asked:
+                self._feed.miss_topic(topic, f"{topic} has no publisher", self._now())
             if infos:
-                topic, types = self._wanted[resolved]
                 kinds = {info.topic_type for info in infos}
                 try:
                     self._bind(topic, resolved, self._chosen(topic, kinds, types), infos)
@@ -106,14 +113,15 @@ class LiveSources:
             ) from None
         self._found[topic] = kind
         self._problems.pop(topic, None)
+        if topic in self._asked:
+            self._feed.miss_topic(topic, f"no message on {topic} yet", self._now())
         for name, text in self._feed.bind(topic, kind).items():
             self._set_problem(name, text)
+        quality = quality_of_all(topic, infos)
+        if quality.durability is DurabilityPolicy.TRANSIENT_LOCAL:
+            self._latched.add(topic)
         self._node.create_subscription(
-            message,
-            resolved,
-            lambda data: self._on_message(topic, kind, data),
-            quality_of_all(topic, infos),
-            raw=True,
+            message, resolved, lambda data: self._on_message(topic, kind, data), quality, raw=True
         )
         self._node.get_logger().info(f"source {topic}: {kind}")
 
@@ -125,12 +133,17 @@ class LiveSources:
     def _set_problem(self, key: str, text: str) -> None:
         if self._problems.get(key) != text:
             self._problems[key] = text
+            if key in self._asked:
+                self._feed.miss_topic(key, text, self._now())
+            else:
+                self._feed.scene.unmonitored.lacks(key, key, text, self._now())
             self._node.get_logger().error(self._mapping.located(text))
 
     # -- messages
 
     def _on_message(self, topic: str, kind: str, data: bytes) -> None:
         self._messages[topic] = self._messages.get(topic, 0) + 1
+        self._silence.heard(topic, self._now())
         for each in self._feed.take(RawMessage(topic, kind, data, self._now())):
             self._take(each)
         for name, (count, text) in self._feed.scene.take_news().items():
@@ -140,6 +153,11 @@ class LiveSources:
         return int(self._node.get_clock().now().nanoseconds)
 
     # -- report
+
+    @property
+    def unmonitored(self) -> tuple[Unmonitored, ...]:
+        """What the file asks for and is not monitored now, the oldest first; then what fell silent."""
+        return *self._feed.unmonitored, *self._silence.rows(self._now(), self._latched)
 
     def lines(self) -> list[LineReport]:
         """Return what each line of the file does, in the order of the file; then the topics that it implies."""
@@ -167,7 +185,9 @@ class LiveSources:
         return LineReport(name, topic, kind, messages, states, refused, refusal, dropped, level, text)
 
     def _report(self) -> None:
-        """Publish the state of each line of the file."""
+        """Publish the state of each line of the file; log what is not monitored, each row at once and every 10 s."""
+        for row in self.unmonitored:
+            self._warn(f"{row.line} {row.what}", f"not monitored: {self._mapping.located(row.text)}", 1)
         array = DiagnosticArray()
         array.header.stamp = self._node.get_clock().now().to_msg()
         for line in self.lines():
@@ -180,6 +200,7 @@ class LiveSources:
                     level=bytes([line.level]), name=name, message=line.text, hardware_id="none", values=pairs
                 )
             )
+        array.status += unmonitored_statuses(self._node.get_name(), self.unmonitored, self._now())
         self._out.publish(array)
 
 
