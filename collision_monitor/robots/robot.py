@@ -52,7 +52,8 @@ class Robot:
 
     rows (S,): rows of these links in the tree. shapes: of each link, with their poses in its frame. touching, disabled:
     pairs of links whose contact is expected, by construction and by the SRDF. known_joints: names of all joints, with
-    the fixed and mimic ones. problems: a text for each part of the files that is left out.
+    the fixed and mimic ones. left_out: name of the link, or nothing, and a text for each part of the files that is left
+    out.
     """
 
     tree: KinematicTree
@@ -61,7 +62,12 @@ class Robot:
     touching: frozenset[Pair]
     disabled: frozenset[Pair]
     known_joints: frozenset[str]
-    problems: tuple[str, ...]
+    left_out: tuple[tuple[str, str], ...]
+
+    @property
+    def problems(self) -> list[str]:
+        """The texts of `left_out`."""
+        return [text for _, text in self.left_out]
 
     @property
     def links(self) -> list[str]:
@@ -87,15 +93,15 @@ def make_robot(urdf: Description, srdf: Description | None = None, packages: Map
     model = parse_urdf(urdf.text, urdf.name)
     tree = kinematic_tree(model)
     files = FileLocator(urdf.folder, packages)
-    problems: list[str] = []
+    left_out: list[tuple[str, str]] = []
     shapes: dict[str, tuple[tuple[Shape, Pose], ...]] = {}
     for name in tree.links:
         found, texts = link_shapes(model.links[name], files)
-        problems += texts
+        left_out += [(name, text) for text in texts]
         if found:
             shapes[name] = tuple(found)
     if not shapes:
-        reason = f": {problems[0]}" if problems else ", only <visual> or nothing"
+        reason = f": {left_out[0][1]}" if left_out else ", only <visual> or nothing"
         raise InputError(f"{urdf.name}: expected a link with a <collision> that can be used, got none{reason}")
     disabled: set[Pair] = set()
     if srdf is not None:
@@ -103,7 +109,8 @@ def make_robot(urdf: Description, srdf: Description | None = None, packages: Map
         unknown = sorted({name for pair in disabled for name in pair} - set(model.links))
         if unknown:
             more = "" if len(unknown) <= _SHOWN else f" and {len(unknown) - _SHOWN} more"
-            problems.append(f"{srdf.name}: expected links of {urdf.name}, got {', '.join(unknown[:_SHOWN])}{more}")
+            text = f"{srdf.name}: expected links of {urdf.name}, got {', '.join(unknown[:_SHOWN])}{more}"
+            left_out.append(("", text))
     rows = np.array([row for row, name in enumerate(tree.links) if name in shapes])
     return Robot(
         tree,
@@ -112,5 +119,5 @@ def make_robot(urdf: Description, srdf: Description | None = None, packages: Map
         frozenset(touching_links(tree, shapes)),
         frozenset(pair for pair in disabled if pair[0] in shapes and pair[1] in shapes),
         frozenset(model.joints),
-        tuple(problems),
+        tuple(left_out),
     )

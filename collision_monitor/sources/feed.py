@@ -19,6 +19,7 @@ from collision_monitor.sources.ground.mapping import HEADER, Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.source import RawMessage, Source
 from collision_monitor.sources.ground.source_scene import SourceScene
+from collision_monitor.sources.ground.unmonitored import Unmonitored
 from collision_monitor.sources.ground.waiting_states import Step
 from collision_monitor.sources.kinds import BY_TYPE, SECTIONS
 from collision_monitor.sources.messages.static_objects import StandingObjects
@@ -112,6 +113,20 @@ class Feed:
         for topic in topics:
             self._by_topic.setdefault(topic, []).append(source)
 
+    def lines_of(self, topic: str) -> list[str]:
+        """Return the lines of the file that use a topic; the topic itself if the file only implies it."""
+        return [entry.name for entry in self.mapping.topics.get(topic, ())] or [self.owners.get(topic, topic)]
+
+    def miss_topic(self, topic: str, reason: str, now_ns: int) -> None:
+        """Note why nothing of a topic is monitored: no publisher, another type. A message ends that."""
+        for line in self.lines_of(topic):
+            self.scene.unmonitored.lacks(line, topic, reason, now_ns)
+
+    @property
+    def unmonitored(self) -> tuple[Unmonitored, ...]:
+        """What the file asks for and is not monitored now, the oldest first."""
+        return self.scene.unmonitored.rows()
+
     @property
     def misplaced(self) -> list[str]:
         """Static objects in frames that tf has not connected with the monitor's so far, with the reason."""
@@ -121,6 +136,9 @@ class Feed:
 
     def begin(self, received: int) -> list[Input]:
         """Return the descriptions of what is known from the start, as a snapshot."""
+        self.scene.received_ns = received
+        for topic in self.wanted:
+            self.miss_topic(topic, f"no message on {topic} yet", received)
         for entry in self.mapping.sources:
             if entry.shapes and not entry.static and entry.marker is None:
                 self.scene.describe(entry.describe())
@@ -134,6 +152,9 @@ class Feed:
 
     def take(self, raw: RawMessage) -> list[Input]:
         """Return the inputs that a message becomes."""
+        self.scene.received_ns = raw.received
+        for line in self.lines_of(raw.topic):
+            self.scene.has(line, raw.topic)
         try:
             content = self._decode(raw.type, raw.data)
         except MessageError as error:

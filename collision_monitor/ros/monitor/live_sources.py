@@ -19,7 +19,7 @@ from collision_monitor.ros.endpoints import message_class
 from collision_monitor.ros.health.line_report import DiagnosticLevel, LineReport
 from collision_monitor.ros.names import is_topic_name
 from collision_monitor.session.mcap.definitions import definition
-from collision_monitor.sources import Decoder, Feed, Input, Mapping, RawMessage
+from collision_monitor.sources import Decoder, Feed, Input, Mapping, RawMessage, Unmonitored
 from collision_monitor.sources.messages.tf_objects import TRANSFORMS
 
 SEARCH_PERIOD: Final = 0.2
@@ -48,7 +48,8 @@ class LiveSources:
         self._decoder = Decoder({})
         self._feed = Feed(mapping, self._decoder)
         # Transforms first: if several messages wait, the executor takes them in the order of the subscriptions.
-        wanted = dict.fromkeys(_TF, (TRANSFORMS,)) | self._feed.wanted
+        self._asked = self._feed.wanted  # the file names these topics; those of tf may be there besides
+        wanted = dict.fromkeys(_TF, (TRANSFORMS,)) | self._asked
         for topic in (*wanted, *filter(None, [mapping.step_topic])):
             if not is_topic_name(topic):
                 text = f"expected a topic's name of letters, digits, underscores and slashes, got {topic!r}"
@@ -77,8 +78,10 @@ class LiveSources:
         """Subscribe to the topics that have a publisher by now."""
         for resolved in [name for name, (topic, _) in self._wanted.items() if topic not in self._found]:
             infos = self._node.get_publishers_info_by_topic(resolved)
+            topic, types = self._wanted[resolved]
+            if not infos and topic in self._asked:
+                self._feed.miss_topic(topic, f"{topic} has no publisher", self._now())
             if infos:
-                topic, types = self._wanted[resolved]
                 kinds = {info.topic_type for info in infos}
                 try:
                     self._bind(topic, resolved, self._chosen(topic, kinds, types), infos)
@@ -106,6 +109,8 @@ class LiveSources:
             ) from None
         self._found[topic] = kind
         self._problems.pop(topic, None)
+        if topic in self._asked:
+            self._feed.miss_topic(topic, f"no message on {topic} yet", self._now())
         for name, text in self._feed.bind(topic, kind).items():
             self._set_problem(name, text)
         self._node.create_subscription(
@@ -125,6 +130,10 @@ class LiveSources:
     def _set_problem(self, key: str, text: str) -> None:
         if self._problems.get(key) != text:
             self._problems[key] = text
+            if key in self._asked:
+                self._feed.miss_topic(key, text, self._now())
+            else:
+                self._feed.scene.unmonitored.lacks(key, key, text, self._now())
             self._node.get_logger().error(self._mapping.located(text))
 
     # -- messages
@@ -140,6 +149,11 @@ class LiveSources:
         return int(self._node.get_clock().now().nanoseconds)
 
     # -- report
+
+    @property
+    def unmonitored(self) -> tuple[Unmonitored, ...]:
+        """What the file asks for and is not monitored now, the oldest first."""
+        return self._feed.unmonitored
 
     def lines(self) -> list[LineReport]:
         """Return what each line of the file does, in the order of the file; then the topics that it implies."""
@@ -167,7 +181,9 @@ class LiveSources:
         return LineReport(name, topic, kind, messages, states, refused, refusal, dropped, level, text)
 
     def _report(self) -> None:
-        """Publish the state of each line of the file."""
+        """Publish the state of each line of the file; log what is not monitored, each row at once and every 10 s."""
+        for row in self.unmonitored:
+            self._warn(f"{row.line} {row.what}", f"not monitored: {self._mapping.located(row.text)}", 1)
         array = DiagnosticArray()
         array.header.stamp = self._node.get_clock().now().to_msg()
         for line in self.lines():

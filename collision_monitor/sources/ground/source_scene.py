@@ -12,6 +12,7 @@ from collision_monitor.codec import Change, Removal
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.sources.ground.frames import FrameMotion, FrameTree, MissingFrame
+from collision_monitor.sources.ground.unmonitored import UnmonitoredList
 from collision_monitor.sources.ground.waiting_states import WaitingStates
 
 Floats = NDArray[np.float64]
@@ -28,7 +29,8 @@ class SourceScene:
 
     frame: the monitor's. frames: the tree of tf frames. waiting: the states since the last step. states: number of
     states of each object, by name. refused: what was left out, by its reason. refused_by_name, last_refusal: the same
-    by the key in the sources file. points_dropped: by name, points of scans without a place (NaN).
+    by the key in the sources file. points_dropped: by name, points of scans without a place (NaN). unmonitored: what
+    the file asks for and the monitor does not have. received_ns: when the message that is processed arrived.
     """
 
     def __init__(self, frame: str, max_age: float, *, first_free_id: int = 1, by_header: bool = True) -> None:
@@ -41,6 +43,8 @@ class SourceScene:
         self.last_refusal: dict[str, str] = {}
         self._news: dict[str, tuple[int, str]] = {}
         self.points_dropped: Counter[str] = Counter()
+        self.unmonitored = UnmonitoredList()
+        self.received_ns = 0
         self._described: dict[int, ObjectDescription] = {}
         self._changes: list[Change] = []
         self._next_id = first_free_id
@@ -115,6 +119,14 @@ class SourceScene:
     def refuse_old(self, object_id: int) -> None:
         """Count a state that was too old for the step that would have taken it."""
         self.refuse(self._name(object_id, str(object_id)), "its message is older than max_age at its step")
+
+    def lacks(self, line: str, what: str, reason: str) -> None:
+        """Note that an object, link or topic of a line of the file is not monitored, until `has` is called for it."""
+        self.unmonitored.lacks(line, what, reason, self.received_ns)
+
+    def has(self, line: str, what: str) -> None:
+        """Note that it is monitored."""
+        self.unmonitored.has(line, what)
 
     # -- what the feed calls
 

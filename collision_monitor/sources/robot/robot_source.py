@@ -173,8 +173,14 @@ class RobotSource:
         self._described.pop(body.object_id, None)
 
     def _report_problems(self, robot: Robot, scene: SourceScene) -> None:
-        for problem in robot.problems:
+        scene.unmonitored.drop(self.name, f"{self.name}/")
+        by_link: dict[str, list[str]] = {}
+        for link, problem in robot.left_out:
             scene.refuse(self.name, problem)
+            by_link.setdefault(link, []).append(problem)
+        for link, texts in by_link.items():
+            if link:
+                scene.lacks(self.name, f"{self.name}/{link}", "; ".join(texts))
 
     def _make(self, urdf: Description) -> Robot:
         robot = make_robot(urdf, self._srdf, self._entry.packages)
