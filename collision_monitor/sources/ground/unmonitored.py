@@ -50,6 +50,12 @@ class UnmonitoredList:
         since = now_ns if known is None else known.since_ns
         self._rows[key] = Unmonitored(*key, reason[:LONGEST_REASON], since)
 
+    def explain(self, line: str, what: str, reason: str) -> None:
+        """Give a row that is there another reason."""
+        known = self._rows.get((line, what[:LONGEST_REASON]))
+        if known is not None:
+            self._rows[known.line, known.what] = known._replace(reason=reason[:LONGEST_REASON])
+
     def has(self, line: str, what: str) -> None:
         """Note that something is monitored; without a row this does nothing."""
         self._rows.pop((line, what[:LONGEST_REASON]), None)

@@ -16,6 +16,7 @@ from collision_monitor.shapes.pose import Pose
 from collision_monitor.sources.ground.frames import FrameMotion, MissingFrame
 from collision_monitor.sources.ground.mapping import Mapping as SourcesFile
 from collision_monitor.sources.ground.object_entry import ObjectEntry
+from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.robot.carried_bodies import Body
 from collision_monitor.sources.robot.collision_objects import (
@@ -70,8 +71,10 @@ class HeldObject:
     offset: Pose | None = None
 
 
-class PlanningSceneSource:
+class PlanningSceneSource(Source):
     """The planning scene of one robot, or of none. describe: makes the descriptions of the world's objects."""
+
+    speaks = False
 
     def __init__(
         self, name: str, topics: Mapping[str, tuple[str, ...]], describe: Describe, robot: RobotSource | None
@@ -86,9 +89,6 @@ class PlanningSceneSource:
         self._ids: dict[str, int] = {}
         self._is_changed = False
         self._waits = False  # whether an object is not placed yet
-
-    def begin(self, scene: SourceScene) -> None:
-        """See Source. The messages bring all objects."""
 
     def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
         """See Source."""

@@ -18,12 +18,13 @@ from collision_monitor.shapes.pose import Pose
 from collision_monitor.sources.ground.frames import FrameMotion
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.solid_shapes import scaled_shape
+from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.robot.carried_bodies import Body, CarriedBodies
 from collision_monitor.sources.robot.collision_objects import pose_bytes, shape_bytes
 from collision_monitor.sources.robot.joint_table import JointTable
 from collision_monitor.sources.robot.link_rules import LinkRules, allowed_contacts
-from collision_monitor.sources.robot.robot_base import BaseMotion, FixedBase, at_links, robot_base
+from collision_monitor.sources.robot.robot_base import BaseMotion, FixedBase, FrameBase, at_links, robot_base
 from collision_monitor.sources.robot.robot_entry import RobotEntry
 
 Floats = NDArray[np.float64]
@@ -36,8 +37,10 @@ _SHOWN: Final = 8
 _STDDEVS: Final = ("position_stddev", "orientation_stddev", "velocity_stddev", "angular_velocity_stddev")
 
 
-class RobotSource:
+class RobotSource(Source):
     """The links of one robot. fleet: all robots of the file, to which the joints of a shared topic may belong."""
+
+    speaks = False  # its URDF comes once; joints that are silent are listed by `settle`
 
     def __init__(self, entry: RobotEntry, mapping: Mapping, fleet: list[RobotSource]) -> None:
         self.name = entry.name
@@ -90,9 +93,21 @@ class RobotSource:
             if (reason := self._joints.take(content, stamp_ns)) is not None:
                 scene.refuse(self.name, f"{topic}: {reason}")
 
-    def moved_by(self, content: Any, scene: SourceScene) -> Any:
-        """Return the header of the transform in a TFMessage that moves the base; None if there is none."""
-        return None if self.robot is None else self._base.moved_by(content, self.robot, scene)
+    @property
+    def frame(self) -> str:
+        """The frame of tf that the base is at; empty if there is none, or if it is not known yet."""
+        base, robot = self._base, self.robot
+        return base.frame(robot) if isinstance(base, FrameBase) and robot is not None else ""
+
+    def moved_by(self, scene: SourceScene) -> str | None:
+        """Return the frame whose transforms move the base; None if there is none."""
+        return None if self.robot is None else self._base.moved_by(self.robot, scene)
+
+    def restart(self, now_ns: int, scene: SourceScene) -> None:
+        """See Source."""
+        self._base.restart()
+        if self.robot is not None:
+            self._joints.restart()
 
     def settle(self, now_ns: int, scene: SourceScene) -> None:
         """See Source. Observes the bodies about which there is news."""
@@ -286,7 +301,7 @@ class RobotSource:
                 states[field_name] = column
         unknown = (self._needs[chosen] & ~speed_known).any(axis=1) | (not base.motion.twist_known)
         states["flags"][unknown] |= np.uint32(StateFlag.TWIST_UNKNOWN)
-        scene.observe(states, now_ns)
+        scene.observe(self.name, states, now_ns)
 
     def _refuse_unknown(self, names: Any, scene: SourceScene) -> None:
         """Count each joint once that no robot of the file has."""
