@@ -36,7 +36,7 @@ class FileLocator:
             raise InputError(f"expected a path, file:// or package://, got {address!r:.200}")
         path = Path(unquote(rest)) if separator else self._folder / address
         if not _is_file(path):
-            raise InputError(f"expected the file {path}, got none there")
+            raise InputError(f"expected the file {path!s:.300}, {_why_not(path)}")
         return path
 
     def _in_package(self, name: str, rest: str, address: str) -> Path:
@@ -56,15 +56,32 @@ class FileLocator:
             found += [Path(root) / name, Path(root)] if Path(root).name == name else [Path(root) / name]
         for folder in (self._folder, *self._folder.resolve().parents):
             found += [folder] if folder.name == name else [folder / name]
-        return [folder for folder in found if folder.is_dir()]
+        return [folder for folder in found if _is_folder(folder)]
 
 
 def _paths(variable: str) -> list[str]:
     return [path for path in os.environ.get(variable, "").split(os.pathsep) if path]
 
 
+def _is_folder(path: Path) -> bool:
+    try:
+        return path.is_dir()
+    except (OSError, ValueError):
+        return False
+
+
 def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
-    except ValueError:  # a path with a NUL
+    except (OSError, ValueError):  # a folder that may not be read, a name that is too long, a path with a NUL
         return False
+
+
+def _why_not(path: Path) -> str:
+    try:
+        path.stat()
+    except FileNotFoundError:
+        return "got none there"
+    except (OSError, ValueError) as error:
+        return f"it cannot be read: {getattr(error, 'strerror', None) or error!s:.100}"
+    return "got something else there"

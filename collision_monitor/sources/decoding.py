@@ -7,6 +7,7 @@ which the reader is written.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import partial
 from typing import Any, Final
 
@@ -61,6 +62,9 @@ class Decoder:
         self._types.register(get_types_from_msg(text, message_type))
         self._types.get_msgdef(message_type)  # generates the code now, and not when the first message waits
         self._fits.clear()
+        if message_type in _READERS:
+            with suppress(MessageError):  # which the first message raises again
+                self._has_known_layout(message_type)
 
     def __call__(self, message_type: str, data: bytes) -> Any:
         """Return the message. Raises MessageError."""

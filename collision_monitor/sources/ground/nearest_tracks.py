@@ -20,6 +20,11 @@ LARGEST_BLOCK: Final = 400
 blocks in space, across which no pair is made."""
 
 
+def load_assignment() -> None:
+    """Import SciPy's parts, which takes half a second, before messages arrive."""
+    assigned(np.eye(3), np.eye(3), 1.0)
+
+
 def assigned(detections: Floats, tracks: Floats, gate: float) -> tuple[Rows, Rows]:
     """Return the rows of detections (n, 3) and of the tracks (m, 3) that they continue, at most `gate` (m) away."""
     none = np.zeros(0, np.intp)

@@ -27,6 +27,12 @@ SAME_CORNER: Final = 1e-6
 first corner again, and float32 rounds by 1e-7."""
 
 
+def load_prisms() -> None:
+    """Import what hulls need before messages arrive."""
+    covering_prism(np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.5, 0.5], [0.5, 0.5], [0.0, 1.0]]), 0.0, 1.0)
+    _hull(np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]))
+
+
 def prism(corners: Floats, low: float, high: float) -> Parts:
     """Return the prism over a polygon (n, 2) from z = low to z = high (m), in convex parts.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from collision_monitor.codec import Change, Removal
 from collision_monitor.errors import InputError, reason_of
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.shapes import array_bytes
 from collision_monitor.sources.ground.frames import FrameMotion, FrameTree, MissingFrame
 from collision_monitor.sources.ground.guard import Guard
 from collision_monitor.sources.ground.source_time import SourceTime
@@ -31,6 +32,9 @@ LONGEST_TEXT: Final = 500
 MOST_COUNTED: Final = 20_000
 """Objects whose states are counted by name. Those of further ones are counted together."""
 
+LIKE_ONE_MORE: Final = 20_000
+"""Bytes of a mesh or a cloud that take as long as one more small object: 0.3 ms until the monitor has it."""
+
 _OTHERS: Final = "refused for further reasons"
 _FURTHER: Final = "further objects"
 _LAST_ID: Final = 0xFFFFFFFF
@@ -43,8 +47,9 @@ class SourceScene:
     waiting: the states since the last step. states: number of states of each object, by name; line_states: by the key
     in the sources file. refused: what was left out, by its reason. refused_by_name, last_refusal: the same by the key.
     points_dropped: by the key, points of scans without a place (NaN). unmonitored: what the file asks for and the
-    monitor does not have. received_ns: when the message that is processed arrived. allowance: new descriptions that
-    this message may still make; None: any number.
+    monitor does not have. received_ns: when the message that is processed arrived. allowance: new descriptions of small
+    objects that this message may still make; None: any number. is_behind: whether some wait, because it was used up.
+    preparation: makes robots that take long (`RobotPreparation`); None: they are made at once.
     """
 
     def __init__(self, frame: str, max_age: float, time: SourceTime, taken_ids: Collection[int] = ()) -> None:
@@ -62,7 +67,9 @@ class SourceScene:
         self.points_dropped: Counter[str] = Counter()
         self.unmonitored = UnmonitoredList()
         self.received_ns = 0
-        self.allowance: int | None = None
+        self.allowance: float | None = None
+        self.is_behind = False
+        self.preparation: Any = None
         self._described: dict[int, ObjectDescription] = {}
         self._changes: list[Change] = []
         self._taken_ids = frozenset(taken_ids)
@@ -81,14 +88,16 @@ class SourceScene:
     @property
     def may_describe(self) -> bool:
         """Whether this message may make a further description; the others wait for the next one."""
-        return self.allowance is None or self.allowance > 0
+        may = self.allowance is None or self.allowance > 0.0
+        self.is_behind |= not may
+        return may
 
     def describe(self, description: ObjectDescription) -> None:
         """Add or replace an object."""
         self._described[description.object_id] = description
         self._changes.append(description)
         if self.allowance is not None:
-            self.allowance -= 1
+            self.allowance -= 1.0 + sum(array_bytes(shape) for shape, _ in description.shapes) / LIKE_ONE_MORE
 
     def remove(self, object_id: int) -> None:
         """Remove an object. An unknown one is ignored."""

@@ -20,7 +20,7 @@ from collision_monitor.sources.ground.covariances import usable_blocks, yaw_alon
 from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
-from collision_monitor.sources.ground.prisms import covering_prism
+from collision_monitor.sources.ground.prisms import covering_prism, load_prisms
 from collision_monitor.sources.ground.scene_states import carry_states, empty_states, turn_twists, turned_triangles
 from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
@@ -55,6 +55,7 @@ class AutowareSource(Source):
         self._entry = entry
         self._tracks = TrackTable(entry.name, entry.forget_after)
         self._number = 0
+        load_prisms()
         self._heard_ns = 0  # stamp of the last message: a tracker that is silent does not say that a track is gone
 
     def take(self, topic: str, content: TrackArrays, stamp_ns: int, scene: SourceScene) -> None:

@@ -18,7 +18,7 @@ from collision_monitor.shapes.registry import Box, Cylinder
 from collision_monitor.sources.ground.covariances import usable_blocks
 from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
-from collision_monitor.sources.ground.nearest_tracks import assigned
+from collision_monitor.sources.ground.nearest_tracks import assigned, load_assignment
 from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.scene_states import carry_states, empty_states
 from collision_monitor.sources.ground.source import Source
@@ -56,6 +56,7 @@ class DetectionSource(Source):
         self._tracks = TrackTable(entry.name, entry.forget_after)
         self._last: dict[Key, tuple[int, Floats, Floats]] = {}  # stamp, position, velocity
         self._number = 0
+        load_assignment()
         self._heard_ns = 0  # stamp of the last message: a detector that is silent does not say that a track is gone
 
     def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:

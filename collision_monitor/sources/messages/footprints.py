@@ -19,7 +19,7 @@ from collision_monitor.records import StateFlag
 from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
-from collision_monitor.sources.ground.prisms import covering_prism
+from collision_monitor.sources.ground.prisms import covering_prism, load_prisms
 from collision_monitor.sources.ground.scene_states import carry_states, empty_states
 from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
@@ -43,6 +43,7 @@ class FootprintSource(Source):
         self.name, self.topics = entry.name, {entry.topic: (message_type,)}
         self._entry = entry
         self._corners: Floats | None = None  # (n, 2), in the object's frame
+        load_prisms()
         self._coarse = ""  # why it is not the footprint itself that is described
 
     def begin(self, scene: SourceScene) -> None:

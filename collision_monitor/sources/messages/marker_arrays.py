@@ -80,10 +80,15 @@ def read_markers(data: bytes, *, single: bool) -> MarkerArrays:
     at = len(body) - reader.remaining
     found = MarkerArrays([], [], [], [], [], [], [], np.zeros(0), np.zeros(0))
     starts = []
+    tail = b""  # of the last marker
     try:
         for _ in range(count):
-            at, start = _read_marker(body, at, found)
+            start = _read_marker(body, at, found)
             starts.append(start)
+            behind = start + 104
+            if not (tail and body.startswith(tail, behind)):
+                tail = body[behind : _behind_tail(body, behind)]
+            at = behind + len(tail)  # equal bytes have equal lengths in them
         if not 0 <= len(body) - at <= MOST_BEHIND:
             raise ValueError(f"{len(body)} bytes, read to {at}")
     except (struct.error, ValueError) as error:  # UnicodeDecodeError too
@@ -103,8 +108,8 @@ def read_markers(data: bytes, *, single: bool) -> MarkerArrays:
     )
 
 
-def _read_marker(body: bytes, at: int, found: MarkerArrays) -> tuple[int, int]:
-    """Read one marker; return the offset behind it, and that of its pose and scale."""
+def _read_marker(body: bytes, at: int, found: MarkerArrays) -> int:
+    """Read one marker up to its lifetime; return the offset of its pose and scale."""
     at += -at % 4
     sec, nanosec, length = _TIME_AND_LENGTH.unpack_from(body, at)
     found.stamps.append(sec * _SECOND + nanosec)
@@ -122,7 +127,12 @@ def _read_marker(body: bytes, at: int, found: MarkerArrays) -> tuple[int, int]:
     start = at + 12 + -(at + 12) % 8
     sec, nanosec = _DURATION.unpack_from(body, start + 96)
     found.lifetimes.append(sec * _SECOND + nanosec)
-    at = _behind(body, start + 105, 24, 8)  # frame_locked, then points
+    return start
+
+
+def _behind_tail(body: bytes, at: int) -> int:
+    """Return the offset behind what follows the lifetime, which is for pictures. `at` is a multiple of 8."""
+    at = _behind(body, at + 1, 24, 8)  # frame_locked, then points
     at = _behind(body, at, 16, 4)  # colors
     at = _behind(body, at, 1, 1)  # texture_resource
     at = _behind(body, at + -at % 4 + 8, 1, 1)  # texture: stamp, frame
@@ -133,7 +143,7 @@ def _read_marker(body: bytes, at: int, found: MarkerArrays) -> tuple[int, int]:
     at = _behind(body, at, 1, 1)  # mesh_resource
     at = _behind(body, at, 1, 1)  # mesh_file: name
     at = _behind(body, at, 1, 1)  # its data
-    return at + 1, start  # mesh_use_embedded_materials
+    return at + 1  # mesh_use_embedded_materials
 
 
 def _behind(body: bytes, at: int, size: int, alignment: int) -> int:

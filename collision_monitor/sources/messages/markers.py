@@ -24,6 +24,9 @@ from collision_monitor.sources.messages.marker_arrays import ADD, DELETE, MARKER
 
 __all__ = ["MARKER", "MARKERS", "MarkerSource", "marker_shape"]
 
+MARKERS_AT_ONCE: Final = 500
+"""Markers that waited and are shown together."""
+
 _CUBE, _SPHERE, _CYLINDER = 1, 2, 3
 _ROUND: Final = 1e-6
 """Relative difference up to which two diameters count as equal, because markers are often made from float32."""
@@ -81,7 +84,7 @@ class MarkerSource(Source):
         if self._waiting and scene.may_describe:
             by_message: dict[tuple[int, int], list[int]] = {}
             contents = {}
-            for number in list(self._waiting)[: scene.allowance]:
+            for number in list(self._waiting)[: MARKERS_AT_ONCE]:
                 content, row, stamp = self._waiting.pop(number)
                 contents[id(content)] = content
                 by_message.setdefault((id(content), stamp), []).append(row)
