@@ -40,20 +40,23 @@ def source_failure(line: str, error: Exception, message: RawMessage) -> SourceFa
 
 
 class FailureFiles:
-    """Writes failures into a folder: one file for each kind of error. A file that cannot be written changes nothing."""
+    """Writes failures into a folder: one file for each kind of error. A file that cannot be written changes nothing.
+
+    The number in a file's name is the time of receipt of its message.
+    """
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self._kinds: dict[str, Path | None] = {}
 
-    def keep(self, failure: SourceFailure) -> Path | None:
-        """Write a failure, unless one of its kind is kept; return the file, or None."""
+    def keep(self, failure: SourceFailure) -> tuple[Path | None, bool]:
+        """Write a failure, unless one of its kind is kept. Return the file, if there is one, and whether it is new."""
         if failure.kind in self._kinds:
-            return self._kinds[failure.kind]
+            return self._kinds[failure.kind], False
         if len(self._kinds) >= MOST_FAILURE_FILES:
-            return None
-        path: Path | None = self._folder / f"source_failure_{len(self._kinds) + 1}.json"
+            return None, False
         message = failure.message
+        path: Path | None = self._folder / f"source_failure_{message.received}_{len(self._kinds) + 1}.json"
         content = {
             "line": failure.line,
             "error": failure.text,
@@ -70,7 +73,7 @@ class FailureFiles:
         except OSError:  # such as a disk that is full
             path = None
         self._kinds[failure.kind] = path
-        return path
+        return path, True
 
 
 def read_failure(path: Path) -> RawMessage:

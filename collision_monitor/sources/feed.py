@@ -27,12 +27,16 @@ from collision_monitor.sources.messages.marker_arrays import MarkerArrays
 from collision_monitor.sources.messages.static_objects import StandingObjects
 from collision_monitor.sources.messages.tf_objects import FrameSource
 from collision_monitor.sources.messages.transform_arrays import TRANSFORMS, TransformArrays
+from collision_monitor.sources.robot.robot_preparation import RobotPreparation
 from collision_monitor.sources.robot.robot_source import RobotSource
 
 STATIC: Final = "tf_static"
 
 LISTEN_PERIOD: Final = 100_000_000
 """ns of the clock of receipt between two looks at topics that may have fallen silent."""
+
+MOST_TRANSFORMS: Final = 10_000
+"""Transforms of a message, 0.1 s. A robot sends 100."""
 
 _JUMP: Final = (
     f"stamp: expected one within {MAX_TIME_STEP:g} s of the others, got one further away: another clock, "
@@ -56,11 +60,18 @@ class Feed:
     """Converts messages, one by one. scene: what is known, and what was refused. owners: lines of sections by topic.
 
     allowance: objects that one message may describe anew; None: any number. The others wait for the next message, or
-    for `go_on`. Call `bind` for each topic when its type is known, `begin` once, and `take` for each message.
-    Raises InputError for a file that cannot be used.
+    for `go_on`. preparation: makes robots that take long; None: they are made at once. Call `bind` for each topic when
+    its type is known, `begin` once, and `take` for each message. Raises InputError for a file that cannot be used.
     """
 
-    def __init__(self, mapping: Mapping, decode: Decode, *, allowance: int | None = None) -> None:
+    def __init__(
+        self,
+        mapping: Mapping,
+        decode: Decode,
+        *,
+        allowance: int | None = None,
+        preparation: RobotPreparation | None = None,
+    ) -> None:
         self.mapping = mapping
         self._time = SourceTime(
             by_header=mapping.stamps == HEADER,
@@ -70,6 +81,7 @@ class Feed:
         )
         ids = {entry.object_id for entry in mapping.sources}
         self.scene = SourceScene(mapping.frame, mapping.max_age, self._time, ids)
+        self.scene.preparation = preparation
         self._decode = decode
         self._allowance = allowance
         self._failures: list[SourceFailure] = []
@@ -175,17 +187,23 @@ class Feed:
 
     def take(self, raw: RawMessage) -> list[Input]:
         """Return the inputs that a message becomes. Nothing is raised: what is wrong is refused, and counted."""
+        try:
+            content = self._decode(raw.type, raw.data)
+        except Exception as error:  # refused like what the sources raise
+            content = error
+        return self.take_decoded(raw, content)
+
+    def take_decoded(self, raw: RawMessage, content: Any) -> list[Input]:
+        """Return the inputs that a message becomes. content: as decoded, or the exception that the decoder raised."""
         found: list[Input] = []
         self._prepare(raw.received)
-        content = None
-        with self.scene.guard(raw.topic):
-            content = self._decode(raw.type, raw.data)
-        if content is None:
+        with self.scene.guard(raw.topic):  # beside those around each source: the decoder, stamps, the encoder
+            if isinstance(content, Exception):
+                raise content
+            for each in self._inputs(raw, content):
+                found.append(each)
+        if isinstance(content, Exception):
             self._miss(raw)
-        else:
-            with self.scene.guard(raw.topic):  # beside those around each source: stamps, the encoder
-                for each in self._inputs(raw, content):
-                    found.append(each)
         self._listen(raw.received)
         self._keep_errors(raw)
         return found
@@ -201,6 +219,11 @@ class Feed:
         self._keep_errors(RawMessage("", "", b"", received))
         return found
 
+    @property
+    def is_behind(self) -> bool:
+        """Whether something waits for `go_on`."""
+        return self.scene.is_behind or (self.scene.preparation is not None and self.scene.preparation.is_busy)
+
     def take_failures(self) -> list[SourceFailure]:
         """Return the errors since the last call that nobody expected, with their messages."""
         failures, self._failures = self._failures, []
@@ -209,6 +232,7 @@ class Feed:
     def _prepare(self, received: int) -> None:
         self.scene.received_ns = received
         self.scene.allowance = self._allowance
+        self.scene.is_behind = False
 
     def _keep_errors(self, raw: RawMessage) -> None:
         for name, error in self.scene.take_errors():
@@ -241,8 +265,10 @@ class Feed:
     def _take_transforms(self, raw: RawMessage, content: TransformArrays) -> Iterator[Input]:
         scene, static = self.scene, raw.topic.endswith(STATIC)
         stamps: dict[str, MessageStamp] = {}  # of the frames in this message
-        poses = checked_poses(content.poses)
-        for k, name in enumerate(content.children):
+        poses = checked_poses(content.poses[:MOST_TRANSFORMS])
+        if (more := len(content.children) - MOST_TRANSFORMS) > 0:
+            scene.refuse(raw.topic, f"expected at most {MOST_TRANSFORMS} transforms in a message, got more", more)
+        for k, name in enumerate(content.children[:MOST_TRANSFORMS]):
             with scene.guard(raw.topic, name):
                 child, parent = frame_name(name), frame_name(content.parents[k])
                 stamp = self._time.message_stamp(content.stamps[k], raw.received)

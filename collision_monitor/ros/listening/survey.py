@@ -119,6 +119,7 @@ def check(mapping: Mapping, seconds: float) -> list[LineReport]:
         sources = LiveSources(listener.node, mapping, lambda given: None, lambda name, text, count: None)
         sources.begin()
         listener.listen(seconds)
+        sources.close()
         return sources.lines()
 
 

@@ -7,20 +7,33 @@ that cannot be used is logged with the reason and reported in `~/sources`; the o
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Final
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from rclpy.logging import get_logging_directory
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from collision_monitor.errors import CollisionMonitorError, InputError
+from collision_monitor.errors import CollisionMonitorError, InputError, MessageError
 from collision_monitor.pipeline.topics import SOURCES
 from collision_monitor.ros.endpoints import message_class
 from collision_monitor.ros.health.line_report import DiagnosticLevel, LineReport
+from collision_monitor.ros.monitor.large_messages import LargeMessages
 from collision_monitor.ros.names import is_topic_name
 from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.sources import Decoder, Feed, Input, Mapping, RawMessage, Unmonitored
-from collision_monitor.sources.messages.tf_objects import TRANSFORMS
+from collision_monitor.sources.failures import FailureFiles
+from collision_monitor.sources.messages.clouds import CLOUD, SCAN
+from collision_monitor.sources.messages.transform_arrays import TRANSFORMS
+from collision_monitor.sources.robot.robot_preparation import RobotPreparation
+from collision_monitor.sources.robot.robot_source import TEXT
+
+AT_ONE_TIME: Final = 200
+"""New objects of one message: 0.07 s until the monitor has them. The others follow with the next messages."""
+
+GO_ON_PERIOD: Final = 0.02
+"""s between two looks at what waits: further new objects, large messages that are decoded, robots that are made."""
 
 SEARCH_PERIOD: Final = 0.2
 """s between two looks at the graph for topics of the file."""
@@ -29,6 +42,9 @@ REPORT_PERIOD: Final = 1.0
 """s between two messages on `~/sources`."""
 
 _TF: Final = ("/tf", "/tf_static")
+_AT_ONCE: Final = (TRANSFORMS, SCAN, CLOUD, TEXT)
+"""Types that are decoded at once, however large: tf comes before what it places; the others are arrays or a text."""
+
 _DEPTH: Final = {"/tf": 100, "/tf_static": 100}
 """Depth of the queue; 10 for the other topics."""
 
@@ -46,7 +62,10 @@ class LiveSources:
         self._node, self._take, self._warn = node, take, warn
         self._mapping = mapping
         self._decoder = Decoder({})
-        self._feed = Feed(mapping, self._decoder)
+        self._preparation = RobotPreparation()
+        self._feed = Feed(mapping, self._decoder, allowance=AT_ONE_TIME, preparation=self._preparation)
+        self._large = LargeMessages(self._decoder)
+        self._failures = FailureFiles(Path(get_logging_directory()))
         # Transforms first: if several messages wait, the executor takes them in the order of the subscriptions.
         self._asked = self._feed.wanted  # the file names these topics; those of tf may be there besides
         wanted = dict.fromkeys(_TF, (TRANSFORMS,)) | self._asked
@@ -61,12 +80,18 @@ class LiveSources:
         self._out = node.create_publisher(DiagnosticArray, SOURCES, QoSProfile(depth=1))
         node.create_timer(SEARCH_PERIOD, self._search)
         node.create_timer(REPORT_PERIOD, self._report)
+        node.create_timer(GO_ON_PERIOD, self._go_on)
 
     def begin(self) -> None:
         """Describe what is known from the start, and look for the topics."""
         for each in self._feed.begin(self._now()):
             self._take(each)
         self._search()
+
+    def close(self) -> None:
+        """End the thread and the processes that prepare what takes long."""
+        self._large.close()
+        self._preparation.close()
 
     def set_pace(self, period: float) -> None:
         """Take no more than one step in `period` (s) of the stamps. States wait in the meantime, and newer ones win."""
@@ -140,10 +165,33 @@ class LiveSources:
 
     def _on_message(self, topic: str, kind: str, data: bytes) -> None:
         self._messages[topic] = self._messages.get(topic, 0) + 1
-        for each in self._feed.take(RawMessage(topic, kind, data, self._now())):
+        raw = RawMessage(topic, kind, data, self._now())
+        if kind in _AT_ONCE or not self._large.takes(raw):
+            self._pass_on(self._feed.take(raw))
+        elif not self._large.put(raw):
+            self._pass_on(self._feed.take_decoded(raw, MessageError("too many large messages wait to be decoded")))
+        self._go_on()
+
+    def _go_on(self) -> None:
+        """Take what a thread has decoded, and what was too much at once; one such piece at a time."""
+        decoded = self._large.next()
+        if decoded is not None:
+            self._pass_on(self._feed.take_decoded(*decoded))
+        elif self._feed.is_behind:
+            self._pass_on(self._feed.go_on(self._now()))
+
+    def _pass_on(self, inputs: list[Input]) -> None:
+        """Give inputs to the monitor, and report what was refused on the way to them."""
+        for each in inputs:
             self._take(each)
         for name, (count, text) in self._feed.scene.take_news().items():
             self._warn(name, self._mapping.located(f"{name}: {text}"), count)
+        for failure in self._feed.take_failures():
+            path, is_new = self._failures.keep(failure)
+            if is_new:
+                kept = "it cannot be kept" if path is None else f"it is kept in {path}"
+                text = f"{failure.line}: an unexpected error; its message was left out, and {kept}; please report both"
+                self._node.get_logger().error(f"{self._mapping.located(text)}\n{failure.text}")
 
     def _now(self) -> int:
         return int(self._node.get_clock().now().nanoseconds)
@@ -164,9 +212,10 @@ class LiveSources:
 
     def _line_report(self, name: str, topic: str) -> LineReport:
         scene, messages = self._feed.scene, self._messages.get(topic, 0)
-        refused, refusal = scene.refused_by_name.get(name, 0), scene.last_refusal.get(name, "")
-        parts = f"{name}_", f"{name}/"  # of a group, of a robot
-        states = sum(count for other, count in scene.states.items() if other == name or other.startswith(parts))
+        keys = [name] if name == topic else [name, topic]  # what is refused as a whole counts for its topic
+        refused = sum(scene.refused_by_name.get(key, 0) for key in keys)
+        refusal = next((scene.last_refusal[key] for key in keys if key in scene.last_refusal), "")
+        states = scene.line_states.get(name, 0)
         problem = self._problems.get(name) or self._problems.get(topic)
         if problem:
             level, text = DiagnosticLevel.ERROR, problem

@@ -17,6 +17,9 @@ NANOSECOND: Final = 1e-9
 
 _SHOWN: Final = 5
 
+MOST_NAMES: Final = 10_000
+"""Joints of a message. A humanoid has 60."""
+
 _MOST_LAYOUTS: Final = 32
 """Different lists of names that are remembered. Each publisher of a robot has one."""
 
@@ -43,6 +46,8 @@ class JointTable:
 
     def take(self, message: Any, stamp_ns: int) -> str | None:
         """Store the joints of a JointState. Return the reason if it, or a part of it, cannot be used."""
+        if len(message.name) > MOST_NAMES:
+            return f"expected at most {MOST_NAMES} joints in a message, got {len(message.name)}"
         names = tuple(message.name)
         position, velocity = np.asarray(message.position), np.asarray(message.velocity)
         if len(position) != len(names) or len(velocity) not in (0, len(names)):
