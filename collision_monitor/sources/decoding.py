@@ -14,6 +14,8 @@ from typing import Any, Final
 from collision_monitor.codec.cdr import ENCAPSULATION
 from collision_monitor.errors import MessageError
 from collision_monitor.sources.messages.autoware_bytes import HASHES, read_tracks
+from collision_monitor.sources.messages.clouds import CLOUD
+from collision_monitor.sources.messages.laser_scans import SCAN
 from collision_monitor.sources.messages.marker_arrays import (
     MARKER,
     MARKER_HASHES,
@@ -27,6 +29,9 @@ from collision_monitor.sources.messages.transform_arrays import (
     read_transforms,
     transforms_of,
 )
+from collision_monitor.sources.robot.collision_objects import with_solids
+from collision_monitor.sources.robot.planning_scene import COLLISION_OBJECT, PLANNING_SCENE
+from collision_monitor.sources.robot.robot_source import TEXT
 
 _HASHES: Final = {**HASHES, **MARKER_HASHES, TRANSFORMS: TRANSFORMS_HASH}
 
@@ -38,8 +43,28 @@ _READERS: Final[dict[str, Callable[[bytes], Any]]] = {
 }
 """Read the bytes of a type, if its definition has the hash in _HASHES. They raise MessageError."""
 
-_FROM_OBJECTS: Final = {MARKER: markers_of, MARKERS: markers_of, TRANSFORMS: transforms_of}
-"""Make the same arrays of the objects of another definition, such as that of an older ROS 2."""
+_FROM_OBJECTS: Final[dict[str, Callable[[Any], Any]]] = {
+    MARKER: markers_of,
+    MARKERS: markers_of,
+    TRANSFORMS: transforms_of,
+    PLANNING_SCENE: with_solids,
+    COLLISION_OBJECT: with_solids,
+}
+"""Make the same arrays of the objects of another definition, such as that of an older ROS 2; or the shapes in them."""
+
+_QUICK_BYTES: Final = {PLANNING_SCENE: 10_000, COLLISION_OBJECT: 10_000}
+"""Bytes of a message up to which its decoder takes at most 0.05 s, if that is less than QUICK_MESSAGE."""
+
+QUICK_MESSAGE: Final = 200_000
+"""The same for the other types."""
+
+_ALWAYS_QUICK: Final = (TRANSFORMS, SCAN, CLOUD, TEXT)
+"""Types that are read at once, however large: tf comes before what it places; the others are arrays or one text."""
+
+
+def decodes_slowly(message_type: str, size: int) -> bool:
+    """Return whether a message of so many bytes may take longer to decode than the callbacks of a node may wait."""
+    return message_type not in _ALWAYS_QUICK and size > _QUICK_BYTES.get(message_type, QUICK_MESSAGE)
 
 
 class Decoder:

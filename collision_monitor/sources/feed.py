@@ -9,6 +9,8 @@ from collections.abc import Callable, Hashable, Iterable, Iterator
 from functools import cached_property
 from typing import Any, Final, NamedTuple
 
+import numpy as np
+
 from collision_monitor.codec import Change, encode_descriptions, encode_states
 from collision_monitor.errors import InputError
 from collision_monitor.monitor.state.timeline import Progress
@@ -197,7 +199,7 @@ class Feed:
         """Return the inputs that a message becomes. content: as decoded, or the exception that the decoder raised."""
         found: list[Input] = []
         self._prepare(raw.received)
-        with self.scene.guard(raw.topic):  # beside those around each source: the decoder, stamps, the encoder
+        with np.errstate(all="ignore"), self.scene.guard(raw.topic):  # numbers that are none: the monitor refuses them
             if isinstance(content, Exception):
                 raise content
             for each in self._inputs(raw, content):
@@ -212,7 +214,7 @@ class Feed:
         """Return the inputs of what still waits: objects beyond the allowance of the messages before."""
         found: list[Input] = []
         self._prepare(received)
-        with self.scene.guard("sources"):
+        with np.errstate(all="ignore"), self.scene.guard("sources"):
             self._settle(self._time.now_or(received))
             found += self._changes(received)
         self._listen(received)

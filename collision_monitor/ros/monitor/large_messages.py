@@ -12,9 +12,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from collision_monitor.sources import RawMessage
-
-LARGE: Final = 200_000
-"""Bytes from which on a message is decoded by the thread. A smaller one takes at most 0.05 s."""
+from collision_monitor.sources.decoding import decodes_slowly
 
 MOST_WAITING_BYTES: Final = 256 << 20
 """Bytes of messages that may wait. Further ones are refused."""
@@ -37,8 +35,8 @@ class LargeMessages:
         self._closed = False
 
     def takes(self, raw: RawMessage) -> bool:
-        """Whether a message is to be decoded here: it is large, or one of its topic is before it."""
-        return len(raw.data) > LARGE or self._topics[raw.topic] > 0
+        """Whether a message is to be decoded here: that takes long, or one of its topic is before it."""
+        return decodes_slowly(raw.type, len(raw.data)) or self._topics[raw.topic] > 0
 
     def put(self, raw: RawMessage) -> bool:
         """Let a message be decoded. Return False if too many wait."""

@@ -24,10 +24,8 @@ from collision_monitor.ros.names import is_topic_name
 from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.sources import Decoder, Feed, Input, Mapping, RawMessage, Unmonitored
 from collision_monitor.sources.failures import FailureFiles
-from collision_monitor.sources.messages.clouds import CLOUD, SCAN
 from collision_monitor.sources.messages.transform_arrays import TRANSFORMS
 from collision_monitor.sources.robot.robot_preparation import RobotPreparation
-from collision_monitor.sources.robot.robot_source import TEXT
 
 AT_ONE_TIME: Final = 200
 """New objects of one message: 0.07 s until the monitor has them. The others follow with the next messages."""
@@ -42,9 +40,6 @@ REPORT_PERIOD: Final = 1.0
 """s between two messages on `~/sources`."""
 
 _TF: Final = ("/tf", "/tf_static")
-_AT_ONCE: Final = (TRANSFORMS, SCAN, CLOUD, TEXT)
-"""Types that are decoded at once, however large: tf comes before what it places; the others are arrays or a text."""
-
 _DEPTH: Final = {"/tf": 100, "/tf_static": 100}
 """Depth of the queue; 10 for the other topics."""
 
@@ -166,7 +161,7 @@ class LiveSources:
     def _on_message(self, topic: str, kind: str, data: bytes) -> None:
         self._messages[topic] = self._messages.get(topic, 0) + 1
         raw = RawMessage(topic, kind, data, self._now())
-        if kind in _AT_ONCE or not self._large.takes(raw):
+        if not self._large.takes(raw):
             self._pass_on(self._feed.take(raw))
         elif not self._large.put(raw):
             self._pass_on(self._feed.take_decoded(raw, MessageError("too many large messages wait to be decoded")))

@@ -13,7 +13,7 @@ from collision_monitor.codec import Change, Removal
 from collision_monitor.errors import InputError, reason_of
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.shapes import array_bytes
+from collision_monitor.shapes.shape import array_bytes
 from collision_monitor.sources.ground.frames import FrameMotion, FrameTree, MissingFrame
 from collision_monitor.sources.ground.guard import Guard
 from collision_monitor.sources.ground.source_time import SourceTime
@@ -34,6 +34,9 @@ MOST_COUNTED: Final = 20_000
 
 LIKE_ONE_MORE: Final = 20_000
 """Bytes of a mesh or a cloud that take as long as one more small object: 0.3 ms until the monitor has it."""
+
+PART: Final = 3.0
+"""Small objects that take as long as one more convex part of a concave polygon."""
 
 _OTHERS: Final = "refused for further reasons"
 _FURTHER: Final = "further objects"
@@ -97,7 +100,8 @@ class SourceScene:
         self._described[description.object_id] = description
         self._changes.append(description)
         if self.allowance is not None:
-            self.allowance -= 1.0 + sum(array_bytes(shape) for shape, _ in description.shapes) / LIKE_ONE_MORE
+            size = sum(array_bytes(shape) for shape, _ in description.shapes)
+            self.allowance -= 1.0 + PART * (len(description.shapes) - 1) + size / LIKE_ONE_MORE
 
     def remove(self, object_id: int) -> None:
         """Remove an object. An unknown one is ignored."""

@@ -30,29 +30,31 @@ _END: Final = 2**31 * _SECOND
 class _Stream:
     """The last stamp of a stream, when it was received, and the longest delay between both, all in ns.
 
-    delay: None while the clock of receipt stands still, as in messages that a program makes.
+    delay: None while the clock of receipt stands still, as in messages that a program makes. late: the longest delay of
+    messages before the last one, which counts when the stream has gone on.
     """
 
-    __slots__ = ("delay", "received", "stamp")
+    __slots__ = ("delay", "late", "received", "stamp")
 
     def __init__(self, stamp: int, received: int) -> None:
         self.stamp, self.received = stamp, received
         self.delay: int | None = None
+        self.late: int | None = None
 
     def add(self, stamp: int, received: int) -> None:
-        self._note(stamp, received)
-        self.stamp, self.received = stamp, received
+        """Take a message that is not before the last one."""
+        if received > self.received:
+            known = [each for each in (self.delay, self.late) if each is not None]
+            self.delay = max(*known, received - stamp, received - stamp)
+        self.stamp, self.received, self.late = stamp, received, None
 
     def went_back(self, stamp: int, received: int) -> bool:
-        """Whether a message before the last one is one that time went back for, not one that is late as others were."""
-        is_known = received > self.received and self.delay is not None and received - stamp <= self.delay
-        self._note(stamp, received)
-        return not is_known
-
-    def _note(self, stamp: int, received: int) -> None:
-        if received > self.received:
-            delay = received - stamp
-            self.delay = delay if self.delay is None else max(self.delay, delay)
+        """Whether time went back for a message before the last one; not if it is late, as others of the stream were."""
+        if received <= self.received:
+            return True
+        delay = received - stamp
+        self.late = delay if self.late is None else max(self.late, delay)
+        return self.delay is None or delay > self.delay
 
 
 class Clock:

@@ -16,7 +16,7 @@ from collision_monitor.errors import InputError
 from collision_monitor.query.points.points_within import points_within
 from collision_monitor.shapes.kinds.points import MOST_CLOUD_POINTS
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.registry import Points
+from collision_monitor.shapes.registry import Points, Sphere
 from collision_monitor.sources.ground.frames import FrameMotion, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
@@ -55,6 +55,8 @@ class CloudSource(Source):
         self.name, self.topics = entry.name, {entry.topic: (message_type,)}
         self._entry = entry
         self._memory = BeamMemory()
+        if entry.without:  # load the kernel before messages arrive
+            points_within(Points(np.zeros((1, 3)), 0.1), Pose(), ((Sphere(1.0), Pose()),), Pose(), 0.0)
 
     def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
         """See Source. The first scan describes the object."""

@@ -76,6 +76,11 @@ class DetectionSource(Source):
         states = self._states(found, scene)
         if frame is not IDENTITY:
             carry_states(states, frame, None)
+        near = (np.abs(states["position"]) <= LARGEST_INPUT).all(1)  # False for NaN
+        if not near.all():
+            text = f"position: expected finite numbers up to {LARGEST_INPUT:g}, got others"
+            scene.refuse(entry.name, text, int((~near).sum()))
+            found, states = [each for each, good in zip(found, near.tolist(), strict=True) if good], states[near]
         turned = [bool((q == 0.0).all()) for q in states["quaternion"]]
         states["quaternion"][turned] = 0.0, 0.0, 0.0, 1.0
         kept = []
@@ -110,10 +115,6 @@ class DetectionSource(Source):
             if len(word) > LONGEST_KEY:
                 scene.refuse(self.name, f"expected an id and a class of at most {LONGEST_KEY} characters, got longer")
                 return False
-        p = each.bbox.center.position
-        if not max(abs(p.x), abs(p.y), abs(p.z)) <= LARGEST_INPUT:  # NaN too
-            scene.refuse(self.name, f"position: expected finite numbers, got {p.x:g}, {p.y:g}, {p.z:g}")
-            return False
         return True
 
     def _states(self, found: list[Any], scene: SourceScene) -> Any:

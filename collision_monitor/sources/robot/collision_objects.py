@@ -88,7 +88,7 @@ def collision_object(message: Any, before: CollisionObject | None = None) -> Col
         places = map(_pose, moved) if moved else (place for _, place in before.shapes)
         shapes = tuple((shape, place) for (shape, _), place in zip(before.shapes, places, strict=True))
         return CollisionObject(before.name, shapes, frame_name(message.header.frame_id), _pose(message.pose))
-    shapes = tuple(_shapes(message))
+    shapes = _solids(message)
     if not shapes:
         raise InputError("expected at least one shape, got none")
     if operation == APPEND and before is not None:
@@ -98,6 +98,25 @@ def collision_object(message: Any, before: CollisionObject | None = None) -> Col
     if len(message.id) > LONGEST_KEY:
         raise InputError(f"id: expected at most {LONGEST_KEY} characters, got {len(message.id)}")
     return CollisionObject(str(message.id), shapes, frame_name(message.header.frame_id), _pose(message.pose))
+
+
+def with_solids(message: Any) -> Any:
+    """Return a CollisionObject or a PlanningScene with the shapes of its objects made: what takes long in a message."""
+    objects = [message] if not hasattr(message, "world") else message.world.collision_objects
+    attached = [] if objects == [message] else message.robot_state.attached_collision_objects
+    for each in (*objects, *(it.object for it in attached)):
+        try:
+            each.solids = tuple(_shapes(each))
+        except Exception as error:  # raised again where the object is guarded
+            each.solids = error
+    return message
+
+
+def _solids(message: Any) -> Parts:
+    found = getattr(message, "solids", None)
+    if isinstance(found, Exception):
+        raise found
+    return tuple(_shapes(message)) if found is None else found
 
 
 def has_pose(message: Any) -> bool:
