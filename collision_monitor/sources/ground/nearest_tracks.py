@@ -17,7 +17,7 @@ Rows = NDArray[np.intp]
 
 LARGEST_BLOCK: Final = 400
 """Detections, or tracks, of one assignment: 0.05 s at worst. More than that within a gate of each other are cut into
-blocks in space, across which no pair is made."""
+blocks in space; across their borders, only what is left is paired."""
 
 
 def load_assignment() -> None:
@@ -37,11 +37,13 @@ def assigned(detections: Floats, tracks: Floats, gate: float) -> tuple[Rows, Row
     if not len(columns):
         return none, none
     near = np.isfinite(cKDTree(tracks[columns]).query(detections, distance_upper_bound=gate * (1.0 + 1e-9))[0])
-    found = [
-        _assigned_block(detections, tracks, rows, some, gate)
-        for rows, some in _blocks(detections, tracks, np.flatnonzero(near), columns)
-    ]
-    return np.concatenate([rows for rows, _ in found]), np.concatenate([some for _, some in found])
+    rows, i, j = np.flatnonzero(near), none, none
+    for _ in range(2):  # the second time, what is left at the borders of blocks
+        for block in _blocks(detections, tracks, rows, columns):
+            found = _assigned_block(detections, tracks, *block, gate)
+            i, j = np.concatenate([i, found[0]]), np.concatenate([j, found[1]])
+        rows, columns = np.setdiff1d(rows, i), np.setdiff1d(columns, j)
+    return i, j
 
 
 def _assigned_block(
@@ -64,18 +66,28 @@ def _blocks(detections: Floats, tracks: Floats, rows: Rows, columns: Rows) -> li
         if max(len(rows), len(columns)) <= LARGEST_BLOCK:
             found.append((rows, columns))
             continue
-        points = np.concatenate([detections[rows], tracks[columns]])
-        axis = int(np.ptp(points, axis=0).argmax())
-        by_rows = rows[np.argsort(detections[rows, axis], kind="stable")]
-        by_columns = columns[np.argsort(tracks[columns, axis], kind="stable")]
+        axis = int(np.ptp(np.concatenate([detections[rows], tracks[columns]]), axis=0).argmax())
+        rows, columns = _sorted(detections, rows, axis), _sorted(tracks, columns, axis)
         if len(rows) >= len(columns):
-            cut = len(rows) // 2
-            at = int(np.searchsorted(tracks[by_columns, axis], detections[by_rows[cut], axis]))
-            at = at if detections[by_rows[0], axis] < detections[by_rows[-1], axis] else len(columns) // 2
-            waiting += [(by_rows[:cut], by_columns[:at]), (by_rows[cut:], by_columns[at:])]
+            at = len(rows) // 2
+            other = _cut(detections[rows, axis], at, tracks[columns, axis])
+            waiting += [(rows[:at], columns[:other]), (rows[at:], columns[other:])]
         else:
-            cut = len(columns) // 2
-            at = int(np.searchsorted(detections[by_rows, axis], tracks[by_columns[cut], axis]))
-            at = at if tracks[by_columns[0], axis] < tracks[by_columns[-1], axis] else len(rows) // 2
-            waiting += [(by_rows[:at], by_columns[:cut]), (by_rows[at:], by_columns[cut:])]
+            at = len(columns) // 2
+            other = _cut(tracks[columns, axis], at, detections[rows, axis])
+            waiting += [(rows[:other], columns[:at]), (rows[other:], columns[at:])]
     return found
+
+
+def _sorted(points: Floats, rows: Rows, axis: int) -> Rows:
+    """Return rows by the coordinate of an axis, and equal ones by the other two, so that two equal sets agree."""
+    x = points[rows]
+    return rows[np.lexsort((x[:, axis - 2], x[:, axis - 1], x[:, axis]))]
+
+
+def _cut(values: Floats, at: int, others: Floats) -> int:
+    """Return where sorted values are cut like the sorted others at `at`: at the same value, and the same part of it."""
+    value = values[at]
+    first, last = np.searchsorted(values, value, "left"), np.searchsorted(values, value, "right")
+    low, high = np.searchsorted(others, value, "left"), np.searchsorted(others, value, "right")
+    return int(low + round((at - first) / (last - first) * (high - low)))

@@ -68,7 +68,7 @@ class UnmonitoredList:
     def rows(self) -> tuple[Unmonitored, ...]:
         """Return the rows, the oldest first."""
         found = tuple(self._rows.values())
-        if self._left_out and len(found) >= MOST_ROWS:
+        if self._left_out and 2 * len(found) >= MOST_ROWS:
             more = f"{self._left_out} further ones are not listed"
             return (*found, Unmonitored("", "", more, found[-1].since_ns))
         self._left_out = 0
