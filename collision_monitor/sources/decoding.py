@@ -11,6 +11,8 @@ from contextlib import suppress
 from functools import partial
 from typing import Any, Final
 
+import numpy as np
+
 from collision_monitor.codec.cdr import ENCAPSULATION
 from collision_monitor.errors import MessageError
 from collision_monitor.sources.messages.autoware_bytes import HASHES, read_tracks
@@ -93,6 +95,10 @@ class Decoder:
 
     def __call__(self, message_type: str, data: bytes) -> Any:
         """Return the message. Raises MessageError."""
+        with np.errstate(all="ignore"):  # numbers that are none: the monitor refuses them
+            return self._decoded(message_type, data)
+
+    def _decoded(self, message_type: str, data: bytes) -> Any:
         is_little = data[:2] == ENCAPSULATION[:2] or message_type not in _FROM_OBJECTS
         if message_type in _READERS and is_little and self._has_known_layout(message_type):
             return _READERS[message_type](data)

@@ -6,6 +6,7 @@ that cannot be used is logged with the reason and reported in `~/sources`; the o
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
@@ -38,6 +39,9 @@ SEARCH_PERIOD: Final = 0.2
 
 REPORT_PERIOD: Final = 1.0
 """s between two messages on `~/sources`."""
+
+REMINDER_PERIOD: Final = 10.0
+"""s between two lines of the log about the same object, link or topic that is not monitored."""
 
 _TF: Final = ("/tf", "/tf_static")
 _DEPTH: Final = {"/tf": 100, "/tf_static": 100}
@@ -72,6 +76,7 @@ class LiveSources:
         self._found: dict[str, str] = {}  # topic of the file -> type
         self._problems: dict[str, str] = {}  # the same, or the name of a line -> why it cannot be used
         self._messages: dict[str, int] = {}
+        self._logged: dict[str, float] = {}  # when each row of what is not monitored was last logged, s
         self._out = node.create_publisher(DiagnosticArray, SOURCES, QoSProfile(depth=1))
         node.create_timer(SEARCH_PERIOD, self._search)
         node.create_timer(REPORT_PERIOD, self._report)
@@ -180,7 +185,9 @@ class LiveSources:
         for each in inputs:
             self._take(each)
         for name, (count, text) in self._feed.scene.take_news().items():
-            self._warn(name, self._mapping.located(f"{name}: {text}"), count)
+            line = self._line(name)  # of a topic, whose message was refused as a whole
+            what = f"{name}: {text}" if line == name else f"{line}: {name}: {text}"
+            self._warn(name, self._mapping.located(what), count)
         for failure in self._feed.take_failures():
             path, is_new = self._failures.keep(failure)
             if is_new:
@@ -226,8 +233,14 @@ class LiveSources:
 
     def _report(self) -> None:
         """Publish the state of each line of the file; log what is not monitored, each row at once and every 10 s."""
+        now, logged = time.monotonic(), {}
         for row in self.unmonitored:
-            self._warn(f"{row.line} {row.what}", f"not monitored: {self._mapping.located(row.text)}", 1)
+            key = f"{row.line} {row.what}"
+            logged[key] = self._logged.get(key, -REMINDER_PERIOD)
+            if now - logged[key] >= REMINDER_PERIOD:
+                logged[key] = now
+                self._warn(key, f"not monitored: {self._mapping.located(row.text)}", 1)
+        self._logged = logged
         array = DiagnosticArray()
         array.header.stamp = self._node.get_clock().now().to_msg()
         for line in self.lines():
