@@ -131,4 +131,6 @@ def _as_text(result: Imported, output: Path) -> str:
     if result.refused:
         lines.append(f"last       {result.last_refusal}")
     lines += [f"unseen     {name}: the bag has no message of it that could be used" for name in result.unseen]
+    lines += [f"missing    {row.text}" for row in result.unmonitored]
+    lines += [f"failed     an unexpected error; please report it with {path}" for path in result.failures]
     return "\n".join([*lines, f"written    {result.messages} messages, {result.steps} steps to {output}"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -13,7 +14,7 @@ from numpy.typing import NDArray
 from collision_monitor.errors import InputError
 from collision_monitor.robots.kinematic_tree import KinematicTree, kinematic_tree
 from collision_monitor.robots.link_motions import link_motions
-from collision_monitor.robots.link_shapes import link_shapes
+from collision_monitor.robots.link_shapes import Meshes, link_shapes
 from collision_monitor.robots.mesh_location import FileLocator
 from collision_monitor.robots.srdf import Pair, disabled_pairs
 from collision_monitor.robots.touching_links import touching_links
@@ -26,6 +27,15 @@ from collision_monitor.shapes.registry import Shape
 Floats = NDArray[np.float64]
 
 _SHOWN: Final = 5
+
+QUICK_TEXT: Final = 300_000
+"""Bytes of a URDF or SRDF that is read in less than 0.05 s. That of a humanoid with 100 links has 0.2 MB."""
+
+QUICK_PARTS: Final = 400
+"""Joints and geometries that take less than 0.05 s."""
+
+QUICK_MESHES: Final = 200_000
+"""Bytes of mesh files that are read in less than 0.05 s: 4,000 triangles of binary STL."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +90,26 @@ class Robot:
         return poses[0], twists[0]
 
 
+def takes_long(
+    urdf: Description, srdf: Description | None = None, packages: Mapping[str, Path] | None = None
+) -> bool:
+    """Return whether `make_robot` may take longer than 0.1 s for these texts, or for the meshes that they name.
+
+    Raises InputError for a text that is no URDF.
+    """
+    if max(len(urdf.text), 0 if srdf is None else len(srdf.text)) > QUICK_TEXT:
+        return True
+    model = parse_urdf(urdf.text, urdf.name)
+    geometries = [each.geometry for link in model.links.values() for each in link.collisions]
+    if len(model.joints) + len(geometries) > QUICK_PARTS:
+        return True
+    files, size = FileLocator(urdf.folder, packages), 0
+    for address in {each.attributes.get("filename", "") for each in geometries if each.tag == "mesh"}:
+        with suppress(InputError, OSError):  # what is not there takes no time
+            size += files.find(address).stat().st_size
+    return size > QUICK_MESHES
+
+
 def make_robot(urdf: Description, srdf: Description | None = None, packages: Mapping[str, Path] | None = None) -> Robot:
     """Return the robot of a URDF, and of an SRDF if there is one. packages: folders of ROS packages by name.
 
@@ -90,9 +120,10 @@ def make_robot(urdf: Description, srdf: Description | None = None, packages: Map
     tree = kinematic_tree(model)
     files = FileLocator(urdf.folder, packages)
     left_out: list[tuple[str, str]] = []
+    meshes: Meshes = {}
     shapes: dict[str, tuple[tuple[Shape, Pose], ...]] = {}
     for name in tree.links:
-        found, texts = link_shapes(model.links[name], files)
+        found, texts = link_shapes(model.links[name], files, meshes)
         left_out += [(name, text) for text in texts]
         if found:
             shapes[name] = tuple(found)

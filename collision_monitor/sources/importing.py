@@ -20,8 +20,10 @@ from collision_monitor.session.recording.recording_state import Recording
 from collision_monitor.settings.profile import Profile
 from collision_monitor.sources.bag import Bag
 from collision_monitor.sources.decoding import Decoder
+from collision_monitor.sources.failures import FailureFiles
 from collision_monitor.sources.feed import STATIC, Feed, Input
 from collision_monitor.sources.ground.mapping import Mapping
+from collision_monitor.sources.ground.unmonitored import Unmonitored
 from collision_monitor.sources.kinds import BY_TYPE
 from collision_monitor.sources.messages.tf_objects import TRANSFORMS
 
@@ -32,7 +34,11 @@ _REPEATED: Final = (Topic.MONITORED_STATES.path, Topic.MONITORED_SHAPES.path)
 
 @dataclass
 class Imported:
-    """Result of an import. states: number of states of each object. skipped, refused: what was left out, by reason."""
+    """Result of an import. states: number of states of each object. skipped, refused: what was left out, by reason.
+
+    unmonitored: what the mapping asks for and was not monitored at the end of the bag. failures: files with the
+    messages of unexpected errors, which are to be reported.
+    """
 
     messages: int = 0
     steps: int = 0
@@ -40,6 +46,8 @@ class Imported:
     skipped: dict[str, int] = field(default_factory=dict)
     refused: dict[str, int] = field(default_factory=dict)
     last_refusal: str = ""
+    unmonitored: list[Unmonitored] = field(default_factory=list)
+    failures: list[str] = field(default_factory=list)
 
     @property
     def unseen(self) -> list[str]:
@@ -80,6 +88,10 @@ def import_bag(
         _write(inputs, target, pipeline, result, overwrite, progress)
     if mapping is not None:
         result.states, result.skipped = dict(feed.scene.states), dict(feed.scene.refused)
+        result.unmonitored = list(feed.unmonitored)
+        files = FailureFiles(target.with_name(f"{target.stem}_failures"))
+        kept = [files.keep(failure) for failure in feed.take_failures()]
+        result.failures = [str(path) for path, is_new in kept if path is not None and is_new]
     return result
 
 

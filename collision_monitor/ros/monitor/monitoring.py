@@ -107,6 +107,8 @@ class Monitoring:
         self._keeping_up = KeepingUp(states, self._times, self._refusals, profile, enabled=settings.keep_up)
         self._sources = self._live_sources(settings.sources)
         self._alerts = AlertOutputs(node, self._pipeline, self._unmonitored)
+        if self._sources is not None:
+            resources.callback(self._sources.close)
         node.create_timer(WATCHDOG_PERIOD, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME))
         gc.unfreeze()  # what an earlier configuration kept
         _keep_from_collector()

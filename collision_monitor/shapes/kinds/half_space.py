@@ -76,5 +76,6 @@ KIND: Final = Kind(
     triangles=lambda shape: plane_triangles(np.asarray(shape.normal), shape.offset),
     feature=lambda shape, x, n, tie, off: Feature(FeatureType.FACE, (), 0),
     middle=lambda shape: np.asarray(shape.offset * shape.normal),
+    scaled=lambda shape, factor: HalfSpace(shape.normal, factor * shape.offset),
     bounded=False,
 )

@@ -50,6 +50,12 @@ class UnmonitoredList:
         since = now_ns if known is None else known.since_ns
         self._rows[key] = Unmonitored(*key, reason[:LONGEST_REASON], since)
 
+    def explain(self, line: str, what: str, reason: str) -> None:
+        """Give a row that is there another reason."""
+        known = self._rows.get((line, what[:LONGEST_REASON]))
+        if known is not None:
+            self._rows[known.line, known.what] = known._replace(reason=reason[:LONGEST_REASON])
+
     def has(self, line: str, what: str) -> None:
         """Note that something is monitored; without a row this does nothing."""
         self._rows.pop((line, what[:LONGEST_REASON]), None)
@@ -62,7 +68,7 @@ class UnmonitoredList:
     def rows(self) -> tuple[Unmonitored, ...]:
         """Return the rows, the oldest first."""
         found = tuple(self._rows.values())
-        if self._left_out and len(found) >= MOST_ROWS:
+        if self._left_out and 2 * len(found) >= MOST_ROWS:
             more = f"{self._left_out} further ones are not listed"
             return (*found, Unmonitored("", "", more, found[-1].since_ns))
         self._left_out = 0

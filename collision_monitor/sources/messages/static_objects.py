@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from collision_monitor.shapes.pose import Pose, multiply, rotation_matrix
 from collision_monitor.sources.ground.frames import FrameMotion
 from collision_monitor.sources.ground.object_entry import ObjectEntry
+from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
 
 
-class StandingObjects:
+class StandingObjects(Source):
     """Describes the static objects as soon as tf_static connects their frames with the monitor's."""
 
+    name = "objects"
+    speaks = False
+
     def __init__(self, entries: list[ObjectEntry]) -> None:
-        self.topics: Mapping[str, tuple[str, ...]] = {}
+        self.topics = {}
         self._waiting = entries
 
     def begin(self, scene: SourceScene) -> None:
@@ -26,18 +27,16 @@ class StandingObjects:
             scene.describe(entry.describe(at=entry.pose or Pose()))
         self._list_missing(scene)
 
-    def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
-        """See Source. It has no topics."""
-
     def settle(self, now_ns: int, scene: SourceScene) -> None:
         """See Source. Describes the objects whose frames are known by now."""
         placed = []
         for entry in self._waiting:
             frame = scene.frames.motion(scene.frame, entry.frame, now_ns)
             if isinstance(frame, FrameMotion) and not frame.moving:
-                scene.describe(entry.describe(at=_placed(frame, entry.pose or Pose())))
-                scene.has(entry.name, entry.name)
-                placed.append(entry)
+                with scene.guard(entry.name):  # such as a place too far away
+                    scene.describe(entry.describe(at=_placed(frame, entry.pose or Pose())))
+                    scene.has(entry.name, entry.name)
+                    placed.append(entry)
         if placed:
             self._waiting = [entry for entry in self._waiting if entry not in placed]
         self._list_missing(scene)
@@ -57,7 +56,7 @@ class StandingObjects:
                 f"a static object stands in its frame, but {moving!r} comes by /tf and may move: expected static "
                 f"transforms from {scene.frame!r} to {entry.frame!r}, or `topic: /tf` instead of `static: true`"
             )
-        known = ", ".join(scene.frames.names) or "none"
+        known = scene.frames.some_names
         return f"expected static transforms from {scene.frame!r} to {entry.frame!r}; there are frames {known}"
 
 
