@@ -62,11 +62,6 @@ class Alerts:
         """Look again which objects belong to which classes, because objects were described or removed."""
         self._is_outdated = True
 
-    @property
-    def has_raised(self) -> bool:
-        """Whether `raised` has any."""
-        return bool(self._raised)
-
     def empty_classes(self, roster: Roster) -> list[str]:
         """Return the classes of the rules that no object belongs to."""
         self._update_classes(roster)

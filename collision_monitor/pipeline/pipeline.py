@@ -223,11 +223,6 @@ class Pipeline:
         self._alerts.use(rules)
         return encode_settings(stamp_ns, node, {RULES: rules.text})
 
-    @property
-    def has_raised_alerts(self) -> bool:
-        """Whether any alert is raised."""
-        return self._alerts.has_raised
-
     def raised_alerts(self, missing: Iterable[MissingObject] = (), number: int = 0) -> bytes:
         """Return the bytes of `raised_alert_array`."""
         return encode_alerts(self.raised_alert_array(missing, number))

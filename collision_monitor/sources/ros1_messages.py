@@ -14,7 +14,6 @@ ROS1: Final = "ros1"
 """How the messages of ROS 1 are encoded, by the name that MCAP has for it."""
 
 _RENAMED: Final = {"tf/msg/tfMessage": "tf2_msgs/msg/TFMessage"}
-_HEADER: Final = "std_msgs/msg/Header"
 
 
 def ros2_name(name: str) -> str:

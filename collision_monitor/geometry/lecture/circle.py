@@ -29,7 +29,7 @@ def implicit_circle(p: ArrayLike, center: ArrayLike, radius: ArrayLike) -> Array
         # a difference, a square and the sums each lose half a unit of the last place
         certain = np.abs(value) > 16 * EPSILON * np.abs(parts).sum(axis=-1)
         certain &= np.isfinite(value) & (np.abs(parts) > np.finfo(np.float64).tiny / EPSILON).any(axis=-1)
-    for place in zip(*np.nonzero(~certain), strict=True):
+    for place in map(tuple, np.argwhere(~certain)):
         exact = sum((Fraction(x) - Fraction(c)) ** 2 for x, c in zip(p[place], center[place], strict=True))
         exact -= Fraction(float(radius[place])) ** 2
         value[place] = _rounded(exact)

@@ -26,9 +26,9 @@ from collision_monitor.ros.endpoints import subscription
 from collision_monitor.ros.guard.guard_parameters import read_guard_parameters
 from collision_monitor.ros.guard.guard_report import Decision, GuardReport
 from collision_monitor.ros.guard.guarded_objects import GuardedObjects
-from collision_monitor.ros.guard.monitor_answers import Fault, MonitorAnswers, Now
+from collision_monitor.ros.guard.monitor_answers import ClockReading, Fault, MonitorAnswers
 from collision_monitor.ros.guard.speed_limit import PASSES, SpeedVerdict, limited, verdict
-from collision_monitor.ros.guard.velocity_commands import in_plane, scaled, stopped, why_refused
+from collision_monitor.ros.guard.velocity_commands import in_plane, scaled_command, stopped, why_refused
 from collision_monitor.ros.health.diagnostics import Diagnostics, DiagnosticsParameters
 from collision_monitor.ros.parameters import begin_node
 
@@ -107,7 +107,7 @@ class GuardNode(Node):
             if decision.is_over or decision.refused or decision.fault is not None:
                 self.stop()
             else:
-                self._out.publish(scaled(command, decision.verdict.factor))
+                self._out.publish(scaled_command(command, decision.verdict.factor))
             if decision.is_over:
                 self._command = None
         if self._report.take(decision):
@@ -127,7 +127,7 @@ class GuardNode(Node):
             return Decision(SpeedVerdict(0.0, "", fault.text), fault)
 
     def _decided(self) -> Decision:
-        now = Now(int(self.get_clock().now().nanoseconds), time.monotonic())
+        now = ClockReading(int(self.get_clock().now().nanoseconds), time.monotonic())
         limits, command = self._parameters.limits, self._command
         is_over = command is not None and now.steady - self._commanded > limits.command
         fault = self._clock_fault(now) or self._answers.fault(self._robot, now)
@@ -141,7 +141,7 @@ class GuardNode(Node):
             return Decision(SpeedVerdict(0.0, "", refused), None, False, doubts, refused=True)
         return Decision(self._verdict(command), None, False, doubts)
 
-    def _clock_fault(self, now: Now) -> Fault | None:
+    def _clock_fault(self, now: ClockReading) -> Fault | None:
         if now.stamp_ns > 0:
             return None
         return Fault("no clock", "no time on /clock yet, and use_sim_time is set")

@@ -33,7 +33,7 @@ class Fault(NamedTuple):
     text: str
 
 
-class Now(NamedTuple):
+class ClockReading(NamedTuple):
     """The time by the clock of the stamps (ns), and the steady one (s)."""
 
     stamp_ns: int
@@ -60,7 +60,7 @@ class MonitorAnswers:
 
     # -- faults
 
-    def fault(self, robot: GuardedObjects, now: Now) -> Fault | None:
+    def fault(self, robot: GuardedObjects, now: ClockReading) -> Fault | None:
         """Return the first reason not to rely on the answers; None if there is none."""
         array = self.array
         if array is None:
@@ -75,7 +75,7 @@ class MonitorAnswers:
         )
         return next((each for each in faults if each is not None), None)
 
-    def _late(self, array: CollisionAlertArray, now: Now) -> Fault | None:
+    def _late(self, array: CollisionAlertArray, now: ClockReading) -> Fault | None:
         if not array.step:
             return Fault("no step", f"no step of {self._monitor} yet: no states reach it")
         since = now.steady - self._stepped
@@ -83,7 +83,7 @@ class MonitorAnswers:
             return Fault("no step", f"no step of {self._monitor} for {spoken(since)}")
         return self._age("answer", f"the answers of {self._monitor} are", array.stamp_ns, now)
 
-    def _age(self, kind: str, words: str, stamp_ns: int, now: Now) -> Fault | None:
+    def _age(self, kind: str, words: str, stamp_ns: int, now: ClockReading) -> Fault | None:
         age = (now.stamp_ns - stamp_ns) * NANOSECOND
         if age > self._limits.max_age:
             return Fault(f"old {kind}", f"{words} {spoken(age)} old")
@@ -91,7 +91,7 @@ class MonitorAnswers:
             return Fault(f"early {kind}", f"{words} {spoken(-age)} ahead of the guard's clock: another clock")
         return None
 
-    def _two(self, now: Now) -> Fault | None:
+    def _two(self, now: ClockReading) -> Fault | None:
         heard = sum(now.steady - at <= HEARD for at in self._heard.values())
         if heard < 2:
             return None
@@ -103,7 +103,7 @@ class MonitorAnswers:
             return None
         return Fault(f"no object {missing}", f"no object is named {', '.join(map(repr, missing[:NAMED]))}")
 
-    def _lost(self, robot: GuardedObjects, now: Now) -> Fault | None:
+    def _lost(self, robot: GuardedObjects, now: ClockReading) -> Fault | None:
         for object_id, name in robot.names.items():
             state = robot.states.get(object_id)
             if state is None:
@@ -112,7 +112,7 @@ class MonitorAnswers:
                 return found
         return None
 
-    def _old_state(self, name: str, state: LastState, now: Now) -> Fault | None:
+    def _old_state(self, name: str, state: LastState, now: ClockReading) -> Fault | None:
         if now.steady - state.arrived > self._limits.max_age:
             return Fault(f"no state {name}", f"no state of {name!r} for {spoken(now.steady - state.arrived)}")
         return self._age(f"state {name}", f"the states of {name!r} are", state.stamp_ns, now)

@@ -51,7 +51,7 @@ def why_refused(command: Any, now_ns: int, most_age: float, most_ahead: float) -
     return ""
 
 
-def scaled(command: Any, factor: float) -> Any:
+def scaled_command(command: Any, factor: float) -> Any:
     """Return the command times the factor, with its own header. At a factor of 0 every component is 0, NaN too."""
     made = type(command)()
     if isinstance(command, TwistStamped):
@@ -65,7 +65,7 @@ def scaled(command: Any, factor: float) -> Any:
 
 def stopped(command: Any, stamp: Any) -> Any:
     """Return a command to stand, stamped as the guard's own: it stands for one that is refused or too old."""
-    made = scaled(command, 0.0)
+    made = scaled_command(command, 0.0)
     if isinstance(made, TwistStamped):
         made.header = type(made.header)(frame_id=command.header.frame_id, stamp=stamp)
     return made

@@ -40,12 +40,12 @@ def primitive_shapes(primitive: Any) -> list[Shape]:
 
 
 def mesh_shape(mesh: Any) -> Shape:
-    """Return the shape of a shape_msgs/Mesh, decoded or as `mesh_arrays` left it. Raises ShapeError."""
-    vertices, triangles = mesh if isinstance(mesh, tuple) else mesh_arrays(mesh)
+    """Return the shape of a shape_msgs/Mesh, decoded or as `message_arrays` left it. Raises ShapeError."""
+    vertices, triangles = mesh if isinstance(mesh, tuple) else message_arrays(mesh)
     return Mesh(vertices, triangles)
 
 
-def mesh_arrays(mesh: Any) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def message_arrays(mesh: Any) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Return vertices (n, 3) and triangles (m, 3) of a shape_msgs/Mesh."""
     vertices = np.array([(p.x, p.y, p.z) for p in mesh.vertices], np.float64).reshape(-1, 3)
     indices = np.concatenate([np.zeros(0, np.int64), *(t.vertex_indices for t in mesh.triangles)])

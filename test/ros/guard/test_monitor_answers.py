@@ -20,7 +20,7 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import HELD_BACK, STATE
 from collision_monitor.ros.guard.guard_limits import GuardLimits
 from collision_monitor.ros.guard.guarded_objects import GuardedObjects
-from collision_monitor.ros.guard.monitor_answers import HEARD, Fault, MonitorAnswers, Now
+from collision_monitor.ros.guard.monitor_answers import HEARD, ClockReading, Fault, MonitorAnswers
 from collision_monitor.ros.guard.speed_limit import Braking
 from collision_monitor.shapes.registry import Sphere
 
@@ -59,7 +59,7 @@ def fault(array: CollisionAlertArray | None = None, own: GuardedObjects | None =
     """The fault after one answer; time: of the look, by the stamps' clock and the steady one (s)."""
     answers = MonitorAnswers("object_monitor", GuardLimits())
     answers.take(answer() if array is None else array, 0.0)
-    now = Now(T + round(time.get("clock", 0.0) * SECOND), time.get("steady", 0.0))
+    now = ClockReading(T + round(time.get("clock", 0.0) * SECOND), time.get("steady", 0.0))
     return answers.fault(robot() if own is None else own, now)
 
 
@@ -75,7 +75,7 @@ def test_there_is_no_fault_when_all_is_well() -> None:
 
 def test_nothing_heard_is_a_fault() -> None:
     answers = MonitorAnswers("object_monitor", GuardLimits())
-    assert text(answers.fault(robot(), Now(T, 0.0))) == "no status of object_monitor: does the monitor run?"
+    assert text(answers.fault(robot(), ClockReading(T, 0.0))) == "no status of object_monitor: does the monitor run?"
 
 
 @pytest.mark.parametrize(
@@ -96,18 +96,18 @@ def test_the_same_step_again_is_no_news() -> None:
     answers = MonitorAnswers("object_monitor", GuardLimits())
     for k in range(5):
         answers.take(answer(), 0.1 * k)  # the monitor repeats its last step
-    assert text(answers.fault(robot(), Now(T, 0.4))) == "no step of object_monitor for 0.4 s"
+    assert text(answers.fault(robot(), ClockReading(T, 0.4))) == "no step of object_monitor for 0.4 s"
 
 
 def test_two_monitors_and_a_restarted_one_are_a_fault_until_one_is_left() -> None:
     answers, own = MonitorAnswers("object_monitor", GuardLimits()), robot()
     answers.take(answer(), 0.0)
     answers.take(answer(monitor=8, step=10), 0.1)
-    assert "2 monitors answer as object_monitor" in text(answers.fault(own, Now(T, 0.1)))
+    assert "2 monitors answer as object_monitor" in text(answers.fault(own, ClockReading(T, 0.1)))
     for k in range(2, 14):
         answers.take(answer(monitor=8, step=10 + k), 0.1 * k)
     own.move(states([1, 2, 3], T + 1), 1.3)
-    assert answers.fault(own, Now(T, 1.3)) is None
+    assert answers.fault(own, ClockReading(T, 1.3)) is None
     assert HEARD < 1.3
 
 

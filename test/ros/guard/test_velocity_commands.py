@@ -12,7 +12,7 @@ from geometry_msgs.msg import Twist, TwistStamped
 
 from collision_monitor.ros.guard.velocity_commands import (
     COMPONENTS,
-    scaled,
+    scaled_command,
     spoken,
     stopped,
     twist_of,
@@ -52,7 +52,7 @@ def test_a_component_that_is_not_finite_is_refused_and_stops(part: str, axis: st
     reason = why_refused(command, NOW, 0.5, 0.1)
     assert reason == f"the command is not finite: {part}.{axis} is {value}"
     assert values(stopped(command, Time())) == [0.0] * 6
-    assert values(scaled(command, 0.0)) == [0.0] * 6
+    assert values(scaled_command(command, 0.0)) == [0.0] * 6
 
 
 @pytest.mark.parametrize(
@@ -74,11 +74,11 @@ def test_stamps_that_are_too_old_or_ahead_are_refused(seconds: float, reason: st
 
 def test_a_command_that_passes_keeps_its_header_and_all_components_scale() -> None:
     given = stamped(-0.2, **{f"{part}_{axis}": k + 1.0 for k, (part, axis) in enumerate(COMPONENTS)})
-    made = scaled(given, 0.5)
+    made = scaled_command(given, 0.5)
     assert made.header == given.header
     assert values(made) == [0.5, 1.0, 1.5, 2.0, 2.5, 3.0]
     assert values(given)[0] == 1.0
-    assert values(scaled(twist(linear_y=-2.0), 1.0)) == [0.0, -2.0, 0.0, 0.0, 0.0, 0.0]
+    assert values(scaled_command(twist(linear_y=-2.0), 1.0)) == [0.0, -2.0, 0.0, 0.0, 0.0, 0.0]
 
 
 def test_a_stop_in_place_of_a_refused_command_is_stamped_now() -> None:
