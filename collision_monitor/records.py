@@ -80,6 +80,21 @@ PREDICTION = np.dtype(
 )
 
 
+HELD_BACK = np.dtype(
+    [
+        ("time_to_collision", "<f8"),
+        ("distance", "<f8"),
+        ("closing_speed", "<f8"),
+        ("point_a", "<f8", 3),
+        ("point_b", "<f8", 3),
+        ("id_a", "<u4"),
+        ("id_b", "<u4"),
+        ("rule", "<u4"),
+        ("level", "<u4"),
+    ]
+)
+
+
 MOST_POINTS = 4
 """Largest number of rows of one contact in a ContactArray: the corners that represent a contact patch."""
 

@@ -48,17 +48,26 @@ FLOORS: tuple[tuple[tuple[str, str], ...], ...] = (
         ("world", "scenes to play"),
     ),
     (
-        ("prediction", "motion, time of impact, uncertainty of a pair"),
         ("objects", "description of an object, its models"),
+        ("uncertainty", "how likely two bodies meet"),
         ("robots", "URDF, SRDF, forward kinematics"),
     ),
-    (("meshes", "trees over triangles and points: distance, overlap, impact"),),
+    (("impact", "when two bodies first meet, and their contact now"),),
+    (
+        ("meshes", "trees over triangles and points: distance, overlap, advance"),
+        ("motion", "how bodies move, as the kernels read them"),
+    ),
     (
         ("broad_phase", "grids, trees, sweep and prune"),
         ("narrow_phase", "one file per pair test, dispatch"),
         ("response", "what simulated bodies do when they meet"),
     ),
-    (("geometry", "shapes, poses, bounds, feature tests"), ("settings", "settings and profiles")),
+    (("shapes", "what a shape is: one file a kind, their table, poses"),),
+    (
+        ("geometry", "points, polygons, polyhedra, bounds; the lectures' methods"),
+        ("settings", "settings and profiles"),
+    ),
+    (("checks", "numbers that a user or a file gives"),),
 )
 
 
@@ -128,7 +137,7 @@ def draw_floors() -> None:
     axes.text(right - 9, y + 17, "ground floor: imported by all", va="center", ha="right", color=INK)
     note = (
         "Each folder imports itself and folders on floors below. One import goes sideways: from sources to session.\n"
-        "Only the orange folders import ROS 2."
+        "geometry/lecture stands by itself, above shapes. Only the orange folders import ROS 2."
     )
     axes.text(left, y + 44, note, va="top", color=INK, linespacing=1.3)
     figure.savefig(IMAGES / "architecture.svg", metadata={"Date": None})
@@ -137,15 +146,10 @@ def draw_floors() -> None:
 
 STAGES: tuple[tuple[str, str, str, str], ...] = (
     (
-        "timeline",
-        "timeline.py",
-        "stamp to seconds; refuse a jump until a second message confirms it",
-        "time of the step",
-    ),
-    (
         "1  intake",
         "intake.py",
-        "arguments to records.STATE; store the states in the roster, count refusals",
+        "arguments to records.STATE; advance the time (state/timeline.py), refuse a\n"
+        "jump until a second message confirms it; store the states in the roster",
         "bodies with new states",
     ),
     (
@@ -221,9 +225,10 @@ def draw_step() -> None:
         return at + height / 2
 
     aside(
-        "timeline.py", "step_context.py: argument of most stages",
+        "intake.py", "step_context.py: argument of most stages",
         "roster, profile, settings of the kernels, time and\nnumber of the step, counters of the work done.\n"
-        "roster.py: ids and slots, shapes, bodies (arrays),\nallowed pairs", DATA, 84,
+        "state/roster.py: ids and slots, shapes, bodies\n(arrays), allowed pairs. refusals.py: counts, texts",
+        DATA, 84, -40,
     )  # fmt: skip
     at = aside(
         "tracking.py", "uncertain_predictions.py",
@@ -240,7 +245,7 @@ def draw_step() -> None:
     for file in ("event_list.py", "active_pairs.py"):
         arrow(axes, (side, at), (left + width + 1, place[file] + tall / 2))
     at = aside(
-        "answers.py", "patches.py, filters.py, result.py",
+        "answers.py", "contacts/patches.py, filters.py, result.py",
         "corners of touching faces; filters of region and\nspeed; StepResult and StepStatus", DATA, 58,
     )  # fmt: skip
     arrow(axes, (side, at), (left + width + 1, at))

@@ -12,7 +12,7 @@ import argparse
 import ast
 import re
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
@@ -23,6 +23,21 @@ MONITOR: Final = PACKAGE / "monitor" / "monitor.py"
 
 LONGEST_FUNCTION: Final = 60
 """Lines of a function, from `def` to its last line."""
+
+LONGEST_NAMES: Final = 200
+"""Characters of a string that may hold names of definitions, such as a line of a table. Longer ones are prose."""
+
+USERS: Final = (
+    "scripts/**/*.py",
+    "benchmarks/*",
+    "examples/**/*.py",
+    "launch/*.py",
+    "docs/*",
+    "README.md",
+    "*.toml",
+    "*.py",
+)
+"""What uses the package, besides itself and its tests."""
 
 Definition = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
 
@@ -57,6 +72,12 @@ def modules(package: Path = PACKAGE) -> list[Module]:
         text = path.read_text(encoding="utf-8")
         found.append(Module(path.relative_to(package.parent).as_posix(), text, ast.parse(text)))
     return found
+
+
+def texts_of_users() -> list[str]:
+    """Read what uses the package: scripts, benchmarks, examples, documents and the metadata of the installation."""
+    paths = sorted({path for pattern in USERS for path in ROOT.glob(pattern) if path.is_file()})
+    return [path.read_text(encoding="utf-8") for path in paths if path.suffix in (".py", ".md", ".toml")]
 
 
 def modules_by_folder(package: list[Module]) -> dict[str, int]:
@@ -94,6 +115,50 @@ def _definitions(body: list[ast.stmt]) -> Iterator[Definition]:
                 yield from _definitions(inner)
 
 
+def unused(package: list[Module], outside: Iterable[str] = ()) -> list[str]:
+    """Return what the package defines and neither it nor the texts `outside` name: only tests use it, or nothing does.
+
+    Of classes that inherit from other packages only the class counts, because those packages call their methods.
+    """
+    named = {word for text in outside for word in re.findall(r"\w+", text)}
+    for each in package:
+        named.update(*map(_words, ast.walk(each.tree)))
+    own = {node.name for each in package for node in ast.walk(each.tree) if isinstance(node, ast.ClassDef)}
+    return [
+        f"{each.path} {name}"
+        for each in package
+        for name in _defined(each.tree.body, own)
+        if name not in named and not name.startswith("__")
+    ]
+
+
+def _words(node: ast.AST) -> list[str]:
+    """Return the words by which a node may refer to a definition. A word of a string may be looked up as a name."""
+    match node:
+        case ast.Name(id=name, ctx=ast.Load()) | ast.Attribute(attr=name) | ast.alias(name=name):
+            return [name]
+        case ast.Constant(value=str(text)) if len(text) < LONGEST_NAMES:
+            return re.findall(r"\w+", text)
+    return []
+
+
+def _defined(body: list[ast.stmt], own: set[str]) -> Iterator[str]:
+    """Return the names that a body defines: functions, classes, their methods and properties, and constants."""
+    for node in body:
+        match node:
+            case ast.FunctionDef() | ast.AsyncFunctionDef():
+                yield node.name
+            case ast.ClassDef(bases=bases):
+                yield node.name
+                if all(getattr(base, "id", "") in own for base in bases):
+                    methods = [each for each in node.body if isinstance(each, ast.FunctionDef)]
+                    yield from (each.name for each in methods)
+            case ast.Assign(targets=targets):
+                yield from (name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name))
+            case ast.AnnAssign(target=ast.Name(id=name)):
+                yield name
+
+
 def long_functions(package: list[Module]) -> list[LongFunction]:
     """Return the functions and methods with more than LONGEST_FUNCTION lines, the longest first."""
     found = []
@@ -123,7 +188,7 @@ def class_lines(path: Path, name: str) -> int:
 def figures(package: list[Module]) -> list[tuple[str, str, list[str]]]:
     """Return each figure: its name, its value, and the lines of what stands behind it."""
     folders, shared, long = modules_by_folder(package), namesakes(package), long_functions(package)
-    cones = naming(package, "Cone")
+    cones, idle = naming(package, "Cone"), unused(package, texts_of_users())
     largest = next(iter(folders))
     lines = sum(each.lines for each in package)
     words = len((ROOT / "README.md").read_text(encoding="utf-8").split())
@@ -138,6 +203,7 @@ def figures(package: list[Module]) -> list[tuple[str, str, list[str]]]:
          [f"{name}: {', '.join(paths)}" for name, paths in shared.items()]),
         (f"functions of more than {LONGEST_FUNCTION} lines", f"{len(long)}",
          [f"{each.lines:5} {each.path} {each.name}" for each in long]),
+        ("definitions that only tests use", f"{len(idle)}", idle),
         ("lines of the class Monitor", f"{class_lines(MONITOR, 'Monitor')}", []),
         ("lines of monitor/monitor.py", f"{len(MONITOR.read_text(encoding='utf-8').splitlines())}", []),
         ("words of README", f"{words:,}", []),

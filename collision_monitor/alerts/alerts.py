@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.alerts.answered import answered
+from collision_monitor.alerts.coverage import held_back_pairs, rule_coverage
 from collision_monitor.alerts.debounce import ENTRY, Conditions, Delays, Entries, advance_entries, lasting, restart
 from collision_monitor.alerts.evaluation import evaluate_rule
 from collision_monitor.alerts.measures import Measures, Slots
 from collision_monitor.alerts.messages import AlertChange, Head, NameOf, measured, message
+from collision_monitor.alerts.missing_objects import MissingObject, SilentObjects, unmonitored_objects
 from collision_monitor.alerts.monitored_bodies import MonitoredBodies
 from collision_monitor.alerts.rules import Rule, Rules
 from collision_monitor.alerts.selection import Classes
 from collision_monitor.codec.alerts import AlertCause, CollisionAlert, CollisionAlertArray
+from collision_monitor.impact.body_impact import make_scratch
 from collision_monitor.impact.impact_record import ids_of_keys
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
+from collision_monitor.monitor.state.roster import Roster
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot
 
 _ARRAY: Final = "alerts"
@@ -42,6 +48,8 @@ class Alerts:
         self._last: list[int] | None = None  # stamp (ns) of the last step, and number of restarts of the timeline
         self._raised: dict[tuple[str, int, int], CollisionAlert] = {}
         self._measured: dict[str, Measures] = {}  # by each rule in the last step
+        self._scratch = make_scratch()
+        self._silent = SilentObjects()
 
     def use(self, rules: Rules) -> None:
         """Use these rules from the next step on. The alerts of a rule whose name stays go on; the others end."""
@@ -54,14 +62,9 @@ class Alerts:
         """Look again which objects belong to which classes, because objects were described or removed."""
         self._is_outdated = True
 
-    @property
-    def has_raised(self) -> bool:
-        """Whether `raised` has any."""
-        return bool(self._raised)
-
-    @property
-    def empty_classes(self) -> list[str]:
-        """The classes of the rules that no object belongs to, as of the last step."""
+    def empty_classes(self, roster: Roster) -> list[str]:
+        """Return the classes of the rules that no object belongs to."""
+        self._update_classes(roster)
         return self._classes.without_members()
 
     def raised(self, stamp_ns: int, frame_id: str, step: int) -> CollisionAlertArray:
@@ -74,16 +77,44 @@ class Alerts:
         highest = alerts[0].level if alerts else 0
         return CollisionAlertArray(stamp_ns, frame_id, step, self.number, highest, tuple(alerts))
 
+    def for_guards(
+        self, raised: CollisionAlertArray, monitor: Monitor, missing: Iterable[MissingObject] = (), number: int = 0
+    ) -> CollisionAlertArray:
+        """Return the raised alerts with what a guard needs besides: whom the rules cover, and what they leave out.
+
+        missing: what is asked for and not there. number: of the monitor. No replay depends on this.
+        """
+        scene = self._scene(monitor)
+        coverage = rule_coverage(self.rules, self._classes, scene)
+        levels = {(each.rule, each.id_a, each.id_b): each.level for each in raised.alerts}
+        silent = self._silent.look(scene, raised.stamp_ns) if monitor.last is not None else []
+        return replace(
+            raised,
+            monitor=number,
+            held_back=held_back_pairs(self.rules, self._measured, levels),
+            rule_names=tuple(rule.name for rule in self.rules.rules),
+            coverage=coverage,
+            unmonitored=unmonitored_objects(self.rules, self._classes, scene, coverage, missing, silent),
+        )
+
+    def _scene(self, monitor: Monitor) -> MonitoredBodies:
+        """Return the bodies now, with the classes of all of them known."""
+        self._update_classes(monitor.roster)
+        now = 0.0 if monitor.last is None else monitor.now
+        return MonitoredBodies(monitor.roster, monitor.profile, now, self._scratch)
+
+    def _update_classes(self, roster: Roster) -> None:
+        if self._is_outdated:
+            self._classes.update(roster)
+            self._is_outdated = False
+
     # ------------------------------------------------------------------ steps
 
     def step(self, monitor: Monitor, result: StepResult, frame_id: str, name_of: NameOf) -> list[CollisionAlert]:
         """Return the alerts that a step changes, by rule and pair. Without rules this costs nothing."""
         if not (self.rules.rules or self._gone):
             return []
-        scene = MonitoredBodies(monitor.roster, monitor.profile, monitor.now)
-        if self._is_outdated:
-            self._classes.update(monitor.roster)
-            self._is_outdated = False
+        scene = self._scene(monitor)
         self._follow_time(result.stamp_ns, monitor.restarts)
         head = Head(result.stamp_ns, frame_id, result.step, name_of)
         made = [

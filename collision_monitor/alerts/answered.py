@@ -38,10 +38,11 @@ def answered(scene: MonitoredBodies, result: StepResult) -> Measures:
     found["probability"][~touching] = np.where(unresolved | np.isnan(p["probability"]), 1.0, p["probability"])
     found["distance"][touching] = c["signed_distance"] - c["error_bound"]
     found["distance_error"][touching] = 2.0 * c["error_bound"]
-    found["closing_speed"][touching], found["closing_speed"][~touching] = c["closing_speed"], p["closing_speed"]
+    found["closing_speed"][touching], found["impact_speed"][~touching] = c["closing_speed"], p["closing_speed"]
     found.points[touching] = np.stack([c["point_a"], c["point_b"]], axis=1)
     found.points[~touching] = p["point"][:, None]
     found.uncertain[touching], found.uncertain[~touching] = ~is_certain, unresolved
+    found.is_certain_hit[~touching] = p["status"] == PredictionStatus.HIT
     return found
 
 

@@ -17,7 +17,6 @@ from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.alerts.measures import Array, Slots
 from collision_monitor.alerts.monitored_bodies import MonitoredBodies
 from collision_monitor.impact.body_contact import RESULT, ContactQuery, body_contact
-from collision_monitor.impact.body_impact import make_scratch
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL
 from collision_monitor.uncertainty.uncertainty import body_has_mesh
 
@@ -32,8 +31,6 @@ INSIDE: Final = 0.02
 
 TIME, LEAST, SLOPE = range(3)
 """Rows of `samples`: times (s from now), lower bounds of the distance there (m), and their rates of change (m/s)."""
-
-_SCRATCH: Any = make_scratch()
 
 
 def sphere_approach(scene: MonitoredBodies, i: Slots, j: Slots, horizon: float) -> Array:
@@ -64,7 +61,7 @@ def closest_approaches(
     window = scene.now, horizon
     _search(
         *(scene.roster.multibody, i, j, velocity, rate, window, enough + doubt),
-        *(_SCRATCH, np.empty(RESULT), samples, found),
+        *(scene.scratch, np.empty(RESULT), samples, found),
     )
     return found[0], found[1] - doubt
 

@@ -7,11 +7,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.alerts.answered import is_touching
 from collision_monitor.alerts.closest_approach import closest_approaches, sphere_approach
 from collision_monitor.alerts.measures import Array, Measures, Slots
 from collision_monitor.alerts.monitored_bodies import MonitoredBodies
 from collision_monitor.alerts.nearest_points import nearest_points_at
+from collision_monitor.alerts.quiet import quiet_pairs
 from collision_monitor.alerts.rules import Rule, Rules
 from collision_monitor.alerts.selection import Classes, select
 from collision_monitor.alerts.thresholds import APPROACH
@@ -19,12 +19,6 @@ from collision_monitor.alerts.traffic import post_encroachment_time, required_de
 from collision_monitor.broad_phase.box_pairs import box_pairs
 from collision_monitor.impact.impact_record import ids_of_keys, pair_keys
 from collision_monitor.monitor.candidates import filters_of, keep_checked
-
-REST_SPEED: Final = 0.05
-"""m/s: two bodies none of whose points is faster rest. Trackers report about this for people who stand."""
-
-PARTING_SPEED: Final = 0.05
-"""m/s: a pair whose nearest points move apart faster than this parts."""
 
 REACH: Final = 1.0 + 1e-9
 """Factor on distances that decide which pairs are measured, so that rounding loses none."""
@@ -42,21 +36,16 @@ def evaluate_rule(
         found = _with_near(rules, rule, classes, scene, found, raised)
         _measure(rule, classes, scene, found)
     found.uncertain |= scene.stale[found.i] | scene.stale[found.j]
+    found.reached = _levels(rule, found)
+    found.quiet = quiet_pairs(rule, scene, found)
+    return found, _levels(rule, found)
+
+
+def _levels(rule: Rule, found: Measures) -> NDArray[np.uint8]:
     level = np.zeros(len(found), np.uint8)
     for each in rule.levels:
         level[each.met(found)] = each.level
-    level[_is_quiet(rule, scene, found)] = 0
-    return found, level
-
-
-def _is_quiet(rule: Rule, scene: MonitoredBodies, found: Measures) -> NDArray[np.bool_]:
-    """Return which pairs rest or part, so far as the rule leaves these out. What is uncertain is not quiet."""
-    quiet = np.zeros(len(found), np.bool_)
-    if rule.quiet_at_rest:
-        quiet |= (scene.speed[found.i] <= REST_SPEED) & (scene.speed[found.j] <= REST_SPEED)
-    if rule.quiet_when_parting:
-        quiet |= (found["closing_speed"] < -PARTING_SPEED) & ~is_touching(found)
-    return quiet & ~found.uncertain
+    return level
 
 
 def _with_near(

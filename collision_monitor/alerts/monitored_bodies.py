@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.alerts.measures import Array, Slots
+from collision_monitor.impact.body_impact import Scratch, make_scratch
 from collision_monitor.monitor.filters import bodies_in, is_bounded
 from collision_monitor.monitor.state.roster import Roster
 from collision_monitor.settings.profile import Profile
@@ -18,12 +19,13 @@ class MonitoredBodies:
     (N, 3): extrapolated from the last states. radius (N,): of the sphere about the origin that holds the body (m); may
     be infinite. turning (N,): bound on the speed of its points about the origin (m/s); speed (N,): on any.
     doubt (N,): how far it may have left its path since its last state (m). stale (N,): the last state is too old, or
-    there is none.
+    there is none. scratch: memory for the kernels, of one thread; None: its own.
     """
 
-    def __init__(self, roster: Roster, profile: Profile, now: float) -> None:
+    def __init__(self, roster: Roster, profile: Profile, now: float, scratch: Scratch | None = None) -> None:
         b, top = roster.bodies, roster.top
         self.roster, self.profile, self.now = roster, profile, now
+        self.scratch = make_scratch() if scratch is None else scratch
         age = np.where(b.static[:top], 0.0, now - b.time[:top])
         turning = np.sqrt((b.angular[:top] ** 2).sum(axis=1))
         self.radius: Array = b.motion["radius"][:top]
@@ -39,6 +41,11 @@ class MonitoredBodies:
         if is_bounded(profile.region_min, profile.region_max):
             low, high = profile.region_min, profile.region_max
             self.present &= bodies_in(b, top, now, low, high, profile.stale_acceleration)
+
+    def speed_within(self, horizon: float) -> Array:
+        """Return a bound (N,) on the speed (m/s) of any point until `horizon` (s) from now, as the states declare."""
+        later = self.velocity + self.roster.bodies.acceleration[: self.roster.top] * horizon
+        return np.asarray(np.maximum(self.speed, np.sqrt((later**2).sum(axis=1)) + self.turning))
 
     def velocity_at(self, slots: Slots, points: Array) -> Array:
         """Velocity (m/s) of points (n, 3) of these bodies."""

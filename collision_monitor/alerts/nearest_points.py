@@ -11,7 +11,7 @@ from collision_monitor._jit import kernel
 from collision_monitor.alerts.measures import Array, Slots
 from collision_monitor.alerts.monitored_bodies import MonitoredBodies
 from collision_monitor.impact.body_contact import RESULT, ContactQuery, body_contact
-from collision_monitor.impact.body_impact import CLOSING, make_scratch
+from collision_monitor.impact.body_impact import CLOSING
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B
 
 
@@ -31,9 +31,6 @@ class Nearest(NamedTuple):
     closing: Array
 
 
-_SCRATCH: Any = make_scratch()
-
-
 def nearest_points_at(
     scene: MonitoredBodies, i: Slots, j: Slots, times: Array, limits: Array, *, widen: bool
 ) -> Nearest:
@@ -44,7 +41,7 @@ def nearest_points_at(
     results = np.full((len(i), RESULT), np.nan)
     found = np.zeros(len(i), np.bool_)
     acceleration = scene.profile.stale_acceleration if widen else 0.0
-    _contacts(scene.roster.multibody, i, j, times, limits, acceleration, _SCRATCH, results, found)
+    _contacts(scene.roster.multibody, i, j, times, limits, acceleration, scene.scratch, results, found)
     results[~found] = np.nan
     points = np.stack([results[:, POINT_A : POINT_A + 3], results[:, POINT_B : POINT_B + 3]], axis=1)
     normal = results[:, NORMAL : NORMAL + 3]

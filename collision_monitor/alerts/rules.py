@@ -7,14 +7,16 @@ from __future__ import annotations
 
 import fnmatch
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Final, Self
 
 from collision_monitor.alerts.protective_separation import ProtectiveSeparation, read_protective_separation
 from collision_monitor.alerts.thresholds import FROM_ANSWERS, LEVELS, Thresholds, read_levels
 from collision_monitor.alerts.zones import Zone, read_zone
+from collision_monitor.errors import InputError
 from collision_monitor.settings.yaml_entry import YamlEntry
 from collision_monitor.settings.yaml_file import read_text
 
@@ -24,6 +26,22 @@ ANY: Final = "any"
 MOST: Final = 100
 """Rules, classes, zones, patterns of a class and allowed pairs of a file: a step evaluates each of them."""
 
+MOST_PATTERNS: Final = 1000
+"""Members of all classes of a file together."""
+
+MOST_WILDCARDS: Final = 2000
+"""Of `*`, `?` and `[` in all of them."""
+
+LONGEST_PATTERN: Final = 256
+"""Characters of a member. A name has 256 bytes at most."""
+
+LARGEST: Final = 1 << 16
+"""Bytes of a text. One hundred rules have 10 KB. The limits keep reading below 100 ms, in which a running monitor is
+silent."""
+
+_VALUES: Final = 5000
+"""Values in a text: one hundred rules have 2,000."""
+
 _RULE: Final = (
     *("between", *LEVELS, "raise_after", "clear_after", "quiet_at_rest", "quiet_when_parting"),
     *("inside", "outside", "protective_separation"),
@@ -32,17 +50,21 @@ _RULE: Final = (
 
 @dataclass(frozen=True)
 class ObjectClass:
-    """Objects by name, id or group. pattern: of the names; None: no name. groups: bits of ObjectDescription.group."""
+    """Objects by name, id or group. patterns: of the names. groups: bits of ObjectDescription.group."""
 
     name: str
-    pattern: re.Pattern[str] | None
+    patterns: tuple[str, ...]
     ids: frozenset[int]
     groups: int
 
     def has(self, object_id: int, name: str, group: int) -> bool:
         """Return whether an object belongs to the class."""
-        is_named = self.pattern is not None and self.pattern.match(name) is not None
+        is_named = self._pattern is not None and self._pattern.match(name) is not None
         return is_named or object_id in self.ids or bool(group & self.groups)
+
+    @cached_property
+    def _pattern(self) -> re.Pattern[str] | None:
+        return re.compile("|".join(map(fnmatch.translate, self.patterns))) if self.patterns else None
 
 
 @dataclass(frozen=True)
@@ -99,14 +121,18 @@ class Rules:
         """
         if not text.strip():
             return cls()
-        top = YamlEntry.of_text(text, file).table(("classes", "allowed", "zones", "rules"))
+        if (size := len(text.encode("utf-8", "surrogatepass"))) > LARGEST:
+            raise InputError(f"{file}: expected rules of at most {LARGEST} bytes, got {size}")
+        entry = YamlEntry.of_text(text, file, _VALUES)
+        top = entry.table(("classes", "allowed", "zones", "rules"))
         found = {} if "classes" not in top else _bounded(top["classes"])
+        _check_members(found.values())
         classes = {name: _read_class(name, each) for name, each in found.items()}
         zones = {} if "zones" not in top else {name: read_zone(each) for name, each in _bounded(top["zones"]).items()}
         pairs = top["allowed"].items(most=MOST) if "allowed" in top else []
         allowed = tuple(_read_pair(each, classes) for each in pairs)
         if "rules" not in top:
-            raise YamlEntry.of_text(text, file).error("a table `rules`", f"{', '.join(top) or 'none'}")
+            raise entry.error("a table `rules`", f"{', '.join(top) or 'none'}")
         rules = tuple(_read_rule(name, each, classes, zones) for name, each in _bounded(top["rules"]).items())
         return cls(text, classes, allowed, zones, rules)
 
@@ -116,7 +142,22 @@ class Rules:
         brace. Raises InputError."""
         if "\n" in value or "{" in value:
             return cls.parse(value)
-        return cls.parse(read_text(Path(value)), value) if value else cls()
+        return cls.parse(read_text(Path(value), LARGEST), value) if value else cls()
+
+
+def _check_members(classes: Iterable[YamlEntry]) -> None:
+    """Compare the members of all classes with the limits, before one of them is compiled. Raises InputError."""
+    members = wildcards = 0
+    for each in classes:
+        for member in each.items(1, MOST):
+            members += 1
+            if isinstance(member.value, str):
+                wildcards += sum(map(member.value.count, "*?["))
+                if len(member.value) > LONGEST_PATTERN:
+                    raise member.error(f"a name of at most {LONGEST_PATTERN} characters", f"{len(member.value)}")
+            if members > MOST_PATTERNS or wildcards > MOST_WILDCARDS:
+                limits = f"at most {MOST_PATTERNS} members of all classes with {MOST_WILDCARDS} of * ? [ together"
+                raise member.error(limits, "more")
 
 
 def _bounded(entry: YamlEntry) -> dict[str, YamlEntry]:
@@ -142,8 +183,8 @@ def _read_class(name: str, entry: YamlEntry) -> ObjectClass:
         elif isinstance(each.value, int):
             ids.add(_whole(each))
         else:
-            patterns.append(fnmatch.translate(each.text()))
-    return ObjectClass(name, re.compile("|".join(patterns)) if patterns else None, frozenset(ids), groups)
+            patterns.append(each.text())
+    return ObjectClass(name, tuple(patterns), frozenset(ids), groups)
 
 
 def _whole(entry: YamlEntry) -> int:

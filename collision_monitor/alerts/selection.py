@@ -20,10 +20,12 @@ class Classes:
         self._rules = rules
         self._known: dict[int, tuple[int, str, int]] = {}  # by slot: id, name and group
         self._members: dict[str, Mask] = {}
+        self._used = np.zeros(0, np.bool_)
 
     def update(self, roster: Roster) -> None:
         """Take over the descriptions that have changed."""
         top, bodies = roster.top, roster.bodies
+        self._used = bodies.used[:top].copy()
         for name in (ANY, *self._rules.classes):
             members = np.zeros(top, np.bool_)
             before = self._members.get(name, members[:0])[:top]
@@ -40,12 +42,16 @@ class Classes:
                 self._members[name][slot] = each.has(*facts)
 
     def of(self, name: str) -> Mask:
-        """Return the members of a class, by slot (top,)."""
+        """Return the members of a class, by slot (top,). Objects that were removed may be among them."""
         return self._members[name]
 
+    def described(self, name: str) -> Mask:
+        """Return the members of a class that are described, by slot (top,)."""
+        return np.asarray(self._members[name] & self._used)
+
     def without_members(self) -> list[str]:
-        """Return the names of the classes that no object has belonged to."""
-        return [name for name in self._rules.classes if not self._members[name].any()]
+        """Return the names of the classes that no object belongs to."""
+        return [name for name in self._rules.classes if not self.described(name).any()]
 
     def orders(self, between: tuple[str, str], i: Slots, j: Slots) -> tuple[Mask, Mask]:
         """Return for each pair (n,) whether i is in the first class and j in the second, and the other way round."""
@@ -74,20 +80,20 @@ def select(rules: Rules, rule: Rule, classes: Classes, scene: MonitoredBodies, m
     which = np.flatnonzero(chosen)
     i, j = i[which], j[which]
     if rule.inside:
-        chosen[which] &= np.any([_may_be_in(rules, name, scene, i) for name in rule.inside], axis=0) | np.any(
-            [_may_be_in(rules, name, scene, j) for name in rule.inside], axis=0
+        chosen[which] &= np.any([may_be_in_zone(rules, name, scene, i) for name in rule.inside], axis=0) | np.any(
+            [may_be_in_zone(rules, name, scene, j) for name in rule.inside], axis=0
         )
     for name in rule.outside:
-        chosen[which] &= ~(_is_in(rules, name, scene, i) & _is_in(rules, name, scene, j))
+        chosen[which] &= ~(is_in_zone(rules, name, scene, i) & is_in_zone(rules, name, scene, j))
     return chosen
 
 
-def _may_be_in(rules: Rules, zone: str, scene: MonitoredBodies, slots: Slots) -> Mask:
+def may_be_in_zone(rules: Rules, zone: str, scene: MonitoredBodies, slots: Slots) -> Mask:
     """Return whether any part of these bodies may be in the zone."""
     return np.asarray(_distance(rules, zone, scene, slots) <= scene.radius[slots] + scene.doubt[slots])
 
 
-def _is_in(rules: Rules, zone: str, scene: MonitoredBodies, slots: Slots) -> Mask:
+def is_in_zone(rules: Rules, zone: str, scene: MonitoredBodies, slots: Slots) -> Mask:
     """Return whether these bodies are wholly in the zone."""
     return np.asarray(_distance(rules, zone, scene, slots) <= -(scene.radius[slots] + scene.doubt[slots]))
 

@@ -52,7 +52,10 @@ class Thresholds:
     values: Mapping[str, float]
 
     def met(self, measures: Measures) -> NDArray[np.bool_]:
-        """Return for each pair (n,) whether any threshold is passed. A measure that is NaN passes none."""
+        """Return for each pair (n,) whether any threshold is passed that does not leave it out.
+
+        A measure that is NaN passes none.
+        """
         result = np.zeros(len(measures), np.bool_)
         for name, value in self.values.items():
             if name == "time_to_closest_approach":
@@ -78,7 +81,8 @@ class Thresholds:
     @staticmethod
     def _passed(name: str, value: float, measures: Measures) -> NDArray[np.bool_]:
         column = measures[name]
-        return np.asarray(column >= value if LIMITS[name].above else column <= value)
+        passed = column >= value if LIMITS[name].above else column <= value
+        return np.asarray(passed & ~measures.quiet[name] if name in measures.quiet else passed)
 
 
 def read_levels(entry: YamlEntry, content: Mapping[str, YamlEntry]) -> tuple[Thresholds, ...]:

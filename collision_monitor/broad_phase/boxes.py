@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from collision_monitor.checks.numbers import real_array
 from collision_monitor.errors import InputError
 
 Array = NDArray[np.float64]
@@ -18,7 +19,10 @@ CANDIDATES_AT_ONCE: Final = 1 << 20
 
 def box_arrays(lower: ArrayLike, upper: ArrayLike) -> tuple[Array, Array]:
     """Corners (N, 2 or 3) in m as float64 arrays. Raises InputError if they are not finite or lower > upper."""
-    low, high = np.asarray(lower, np.float64), np.asarray(upper, np.float64)
+    try:
+        low, high = real_array(lower), real_array(upper)
+    except (TypeError, ValueError, OverflowError):
+        raise InputError("boxes: expected corners of shape (N, 2 or 3), got something else than numbers") from None
     if low.ndim != 2 or low.shape[1] not in (2, 3) or low.shape != high.shape:
         raise InputError(f"boxes: expected corners of shape (N, 2 or 3), got {low.shape} and {high.shape}")
     if not (np.isfinite(low).all() and np.isfinite(high).all() and (low <= high).all()):

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+from collision_monitor.broad_phase.boxes import box_arrays
 
 
-def overlapping_pairs(lower: Array, upper: Array) -> NDArray[np.int64]:
-    """Pairs (M, 2), i < j, sorted, of axis-aligned boxes (N, 3) that overlap or touch."""
-    meet = np.all((lower[:, None] <= upper[None]) & (lower[None] <= upper[:, None]), axis=-1)
+def overlapping_pairs(lower: ArrayLike, upper: ArrayLike) -> NDArray[np.int64]:
+    """Pairs (M, 2), i < j, sorted, of axis-aligned boxes (N, 2 or 3) that overlap or touch. Raises InputError."""
+    low, high = box_arrays(lower, upper)
+    meet = np.all((low[:, None] <= high[None]) & (low[None] <= high[:, None]), axis=-1)
     return np.argwhere(np.triu(meet, k=1))

@@ -1,4 +1,4 @@
-"""The space partitions behind one interface: corners of boxes in, overlapping pairs out.
+"""The space partitions behind one interface: corners of boxes in, overlapping pairs out, in space and in the plane.
 
 The monitor uses the grids; the others serve comparison and use without a monitor.
 benchmarks/space_partitions.py measures them against each other.
@@ -21,7 +21,7 @@ from collision_monitor.broad_phase.octree import octree_overlaps
 from collision_monitor.broad_phase.sweep_and_prune import sweep_and_prune
 
 Partition = Callable[[Array, Array], Indices]
-"""Lower and upper corners (N, 3) in m -> pairs (M, 2), i < j, sorted, of boxes that overlap or touch."""
+"""Lower and upper corners (N, 2 or 3) in m -> pairs (M, 2), i < j, sorted, of boxes that overlap or touch."""
 
 
 def grid_overlaps(lower: Array, upper: Array) -> Indices:
@@ -29,6 +29,13 @@ def grid_overlaps(lower: Array, upper: Array) -> Indices:
     low, high = box_arrays(lower, upper)
     centre, half = _rounded_out(low, high)
     return overlaps(low, high, *box_pairs(centre, half).astype(np.int64).T)
+
+
+def quadtree_overlaps(lower: Array, upper: Array) -> Indices:
+    """Pairs by a quadtree over x and y, which suits boxes that stand on a floor. Raises InputError."""
+    low, high = box_arrays(lower, upper)
+    i, j = octree_overlaps(low[:, :2], high[:, :2]).T
+    return overlaps(low, high, i, j)
 
 
 def hashed_grid_overlaps(lower: Array, upper: Array) -> Indices:
@@ -47,7 +54,12 @@ def hashed_grid_overlaps(lower: Array, upper: Array) -> Indices:
 
 
 def _rounded_out(low: Array, high: Array) -> tuple[Array, Array]:
-    """Centres and half extents (m) of boxes that contain these boxes in spite of round-off."""
+    """Centres and half extents (N, 3) in m of boxes that contain these boxes in spite of round-off.
+
+    Those of the plane lie at z = 0.
+    """
+    flat = ((0, 0), (0, 3 - low.shape[1]))
+    low, high = np.pad(low, flat), np.pad(high, flat)
     centre = low + 0.5 * (high - low)
     half = np.maximum(high - centre, centre - low)
     return centre, np.nextafter(half + 1e-15 * np.abs(centre), np.inf)
@@ -57,6 +69,7 @@ PARTITIONS: Final[dict[str, Partition]] = {
     "brute force": overlapping_pairs,
     "sweep and prune": sweep_and_prune,
     "AABB tree": tree_overlaps,
+    "quadtree": quadtree_overlaps,
     "octree": octree_overlaps,
     "k-d tree": kd_tree_overlaps,
     "grid": grid_overlaps,

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from collision_monitor.sources import Imported
 
 DESCRIPTION = """\
-Make a session from a ROS bag, and let the monitor answer it. The bag may hold odometry, poses, tf,
+Make a session from a bag of ROS 2 or ROS 1, and let the monitor answer it. The bag may hold odometry, poses, tf,
 footprints, tracks, detections, markers and scans. A mapping file, which is the sources file of the
 live node, gives the topic and the shape of each object:
 
@@ -58,7 +58,9 @@ def add_parser(subparsers: Any) -> None:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("bag", type=Path, metavar="BAG", help=".mcap or .db3 file, or the folder of a bag")
+    parser.add_argument(
+        "bag", type=Path, metavar="BAG", help=".mcap, .db3 or .bag (ROS 1) file, or the folder of a bag"
+    )
     parser.add_argument("--map", type=Path, metavar="FILE", help="mapping file (YAML)")
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="OUT", help="new session (.mcap)")
     parser.add_argument(
@@ -129,4 +131,6 @@ def _as_text(result: Imported, output: Path) -> str:
     if result.refused:
         lines.append(f"last       {result.last_refusal}")
     lines += [f"unseen     {name}: the bag has no message of it that could be used" for name in result.unseen]
+    lines += [f"missing    {row.text}" for row in result.unmonitored]
+    lines += [f"failed     an unexpected error; please report it with {path}" for path in result.failures]
     return "\n".join([*lines, f"written    {result.messages} messages, {result.steps} steps to {output}"])

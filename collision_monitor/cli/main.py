@@ -17,7 +17,7 @@ from collision_monitor.cli.output.output_streams import accept_any_text, discard
 from collision_monitor.errors import CollisionMonitorError
 
 COMMANDS: Final = (
-    "demo", "run", "view", "sources", "world", "replay", "report", "compare",
+    "demo", "run", "view", "sources", "rules", "world", "replay", "report", "compare",
     "check", "salvage", "import", "tradeoff", "tune", "extremes", "bench",
 )  # fmt: skip
 """Commands in the order of `--help`. Each is a module of this package (`import_` for import) with an `add_parser`."""
@@ -34,6 +34,7 @@ examples:
   collision-monitor view                                   show the running monitor in the browser
   collision-monitor view run.mcap                          show a session, with a time line
   collision-monitor sources                                list topics of robots that it can monitor
+  collision-monitor rules --live                           list the rules in force and whom they cover
   collision-monitor world --list                           list the simulated scenes
   collision-monitor world crossing                         publish one of them
   collision-monitor replay run.mcap                        replay without ROS and compare the answers

@@ -33,6 +33,7 @@ examples:
   collision-monitor view run.mcap --replay exact     a session, with the answers of the profile exact
   collision-monitor view --monitor robot1/object_monitor --port 0
   collision-monitor view --host 0.0.0.0              also for other machines: anyone there can look
+  collision-monitor view --allow-host robot.example  behind a proxy of that name
 
 exit codes:
   0  stopped by Ctrl-C or SIGTERM
@@ -57,6 +58,11 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument(
         "--host", default=LOOPBACK, metavar="ADDRESS", help=f"address to serve at (default: {LOOPBACK}, this machine)"
     )
+    parser.add_argument(
+        "--allow-host", action="append", default=[], metavar="NAME",
+        help="serve the page also under this name, such as that of a proxy; can be given again "
+        "(default: only this machine's own names)",
+    )  # fmt: skip
     parser.add_argument(
         "--port", type=whole(0), default=PORT, metavar="N", help=f"port to serve at; 0: a free one (default: {PORT})"
     )
@@ -96,7 +102,7 @@ def _view_session(args: argparse.Namespace, stop: StopRequest) -> None:
     session = Session(args.session)
     with stop.ending(), session_bar("view", session) as progress:
         recording = RecordedSteps(session, args.replay, progress)
-    server = start_server(args.host, args.port)
+    server = start_server(args.host, args.port, args.allow_host)
     view = View(server)
     player = Player(recording.times[-1])
     timeline = PlayerControls(server, recording, player, view.requests)
@@ -124,7 +130,7 @@ def _view_live(args: argparse.Namespace, stop: StopRequest) -> None:
     from collision_monitor.view.topic_content import TopicContent
     from collision_monitor.view.view import PERIOD, View
 
-    server = start_server(args.host, args.port)
+    server = start_server(args.host, args.port, args.allow_host)
     view = View(server)
     view.panel.add_rest()
     scene = TopicContent()

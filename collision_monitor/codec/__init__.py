@@ -3,6 +3,7 @@
 The elements of the hot messages have in the bytes exactly the layout of `records`, so decoding returns views of them.
 """
 
+from collision_monitor.codec.alert_coverage import RuleCoverage, UnmonitoredObject
 from collision_monitor.codec.alerts import (
     AlertCause,
     AlertLevel,
@@ -39,6 +40,8 @@ __all__ = [
     "ParameterEvent",
     "PredictedCollisionArray",
     "Removal",
+    "RuleCoverage",
+    "UnmonitoredObject",
     "decode_alert",
     "decode_alerts",
     "decode_contacts",

@@ -2,13 +2,33 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from enum import IntEnum
 from typing import Any, Final
 
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor.codec.alert_coverage import (
+    LEAST_COVERAGE,
+    LEAST_UNMONITORED,
+    RuleCoverage,
+    UnmonitoredObject,
+    read_coverage,
+    read_unmonitored,
+    write_coverage,
+    write_unmonitored,
+)
 from collision_monitor.codec.cdr import Buffer, Reader, Writer, write_header
+from collision_monitor.records import HELD_BACK
 
 Point = tuple[float, float, float]
+
+
+def none_held_back() -> NDArray[np.void]:
+    """Return no pairs."""
+    return np.zeros(0, HELD_BACK)
+
 
 LEAST_BYTES: Final = 200
 """Bytes of the shortest alert."""
@@ -46,6 +66,7 @@ class CollisionAlert:
     distance: float
     distance_error: float
     closing_speed: float
+    impact_speed: float
     time_to_closest_approach: float
     distance_at_closest_approach: float
     required_deceleration: float
@@ -73,7 +94,7 @@ _TEXTS: Final = ("rule", "name_a", "name_b", "class_a", "class_b", "text")
 
 @dataclass(frozen=True)
 class CollisionAlertArray:
-    """A CollisionAlertArray message."""
+    """A CollisionAlertArray message. held_back: records.HELD_BACK."""
 
     stamp_ns: int
     frame_id: str
@@ -81,6 +102,11 @@ class CollisionAlertArray:
     number: int
     highest: int
     alerts: tuple[CollisionAlert, ...]
+    monitor: int = 0
+    held_back: NDArray[np.void] = field(default_factory=none_held_back)
+    rule_names: tuple[str, ...] = ()
+    coverage: tuple[RuleCoverage, ...] = ()
+    unmonitored: tuple[UnmonitoredObject, ...] = ()
 
 
 def decode_alert(data: Buffer) -> CollisionAlert:
@@ -104,8 +130,13 @@ def decode_alerts(data: Buffer) -> CollisionAlertArray:
     head = reader.stamp_ns(), reader.string("header.frame_id")
     numbers = reader.scalar("u8", "step"), reader.scalar("u8", "number"), reader.scalar("u1", "highest")
     alerts = tuple(_read(reader) for _ in range(reader.count(LEAST_BYTES, "alerts")))
+    monitor = reader.scalar("u8", "monitor")
+    held_back = reader.sequence(HELD_BACK, 8, "held_back")
+    names = tuple(reader.strings("rule_names"))
+    coverage = tuple(read_coverage(reader) for _ in range(reader.count(LEAST_COVERAGE, "coverage")))
+    unmonitored = tuple(read_unmonitored(reader) for _ in range(reader.count(LEAST_UNMONITORED, "unmonitored")))
     reader.finish()
-    return CollisionAlertArray(*head, *numbers, alerts)
+    return CollisionAlertArray(*head, *numbers, alerts, monitor, held_back, names, coverage, unmonitored)
 
 
 def encode_alerts(array: CollisionAlertArray) -> bytes:
@@ -118,6 +149,15 @@ def encode_alerts(array: CollisionAlertArray) -> bytes:
     writer.scalar("u4", len(array.alerts), "alerts")
     for alert in array.alerts:
         _write(writer, alert)
+    writer.scalar("u8", array.monitor, "monitor")
+    writer.sequence(array.held_back, HELD_BACK, 8)
+    writer.strings(list(array.rule_names), "rule_names")
+    writer.scalar("u4", len(array.coverage), "coverage")
+    for each in array.coverage:
+        write_coverage(writer, each)
+    writer.scalar("u4", len(array.unmonitored), "unmonitored")
+    for one in array.unmonitored:
+        write_unmonitored(writer, one)
     return writer.finish()
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.broad_phase.dense_grid import classify_bodies, make_grid
+from collision_monitor.checks.numbers import as_numbers
 from collision_monitor.detection import kernels
 from collision_monitor.detection.partitioned import check_broad_phase, detect_with
 from collision_monitor.errors import InputError, PoseError, UnsupportedError
@@ -145,8 +146,8 @@ class Detector:
 
         Raises InputError for arrays of another shape, PoseError for values that are not finite or not of unit length.
         """
-        positions = np.ascontiguousarray(positions, dtype=np.float64)
-        quaternions = np.ascontiguousarray(quaternions, dtype=np.float64)
+        positions = np.ascontiguousarray(as_numbers(positions, "positions"))
+        quaternions = np.ascontiguousarray(as_numbers(quaternions, "quaternions"))
         n = self._n
         if positions.shape != (n, 3) or quaternions.shape != (n, 4):
             raise InputError(

@@ -73,22 +73,6 @@ class FeatureContact(NamedTuple):
         return f"{self.a} of A on {self.b} of B"
 
 
-def classify_contact(
-    point_a: ArrayLike,
-    vertices_a: ArrayLike,
-    faces_a: ArrayLike,
-    point_b: ArrayLike,
-    vertices_b: ArrayLike,
-    faces_b: ArrayLike,
-    normal: ArrayLike,
-) -> FeatureContact:
-    """Features at the witness points (3,) of two meshes in one frame, for a contact normal (3,) from A to B."""
-    normal = coordinates(normal, "normal", 3)
-    return FeatureContact(
-        mesh_feature_at(point_a, normal, vertices_a, faces_a), mesh_feature_at(point_b, -normal, vertices_b, faces_b)
-    )
-
-
 def mesh_feature_at(
     point: ArrayLike,
     normal: ArrayLike,

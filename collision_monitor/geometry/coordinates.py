@@ -1,10 +1,11 @@
-"""Input check of the geometry functions: finite arrays of the expected shape, or an error that names the array."""
+"""Input check of the geometry functions: points, vectors and triangles as finite arrays of the expected shape."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from collision_monitor.checks.numbers import as_numbers, hides_some
 from collision_monitor.errors import InputError, ShapeError
 
 Array = NDArray[np.float64]
@@ -16,27 +17,12 @@ Signs = NDArray[np.int8]
 def coordinates(value: ArrayLike, what: str, *widths: int) -> Array:
     """Points or vectors (..., width), at least one, with a width of `widths` (default 2 or 3). Raises InputError."""
     widths = widths or (2, 3)
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{what}: expected numbers, got {value!r:.100}") from None
+    array = as_numbers(value, what)
     if array.ndim == 0 or array.shape[-1] not in widths or array.size == 0:
         shapes = " or ".join(f"(..., {width})" for width in widths)
         raise InputError(f"{what}: expected at least one point, shape {shapes}, got shape {array.shape}")
     if not np.isfinite(array).all():
         raise InputError(f"{what}: expected finite coordinates, got NaN or infinity")
-    return array
-
-
-def checked_numbers(value: ArrayLike, what: str, least: float = -np.inf) -> Array:
-    """Finite numbers (...) >= `least`. Raises InputError."""
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{what}: expected numbers, got {value!r:.100}") from None
-    if not np.isfinite(array).all() or (array < least).any():
-        bound = f" >= {least:g}" if least > -np.inf else ""
-        raise InputError(f"{what}: expected finite numbers{bound}, got {value!r:.100}")
     return array
 
 
@@ -56,6 +42,8 @@ def triangles(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> tupl
     points = point_set(vertices, f"{what} vertices", 3, least=3)
     try:
         indices = np.asarray(faces)
+        if hides_some(faces):
+            raise TypeError
     except (TypeError, ValueError, OverflowError):
         raise ShapeError(f"{what} faces: expected integers of shape (m, 3), got {type(faces).__name__}") from None
     if indices.ndim != 2 or indices.shape[1] != 3 or len(indices) == 0 or not np.issubdtype(indices.dtype, np.integer):

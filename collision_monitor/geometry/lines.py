@@ -13,8 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from collision_monitor.checks.numbers import checked_array
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.coordinates import Array, Booleans, Signs, checked_numbers, coordinates
+from collision_monitor.geometry.coordinates import Array, Booleans, Signs, coordinates
 from collision_monitor.geometry.orientation import orient2d, segments_cross
 
 
@@ -46,7 +47,7 @@ class Intersection(NamedTuple):
 def point_at(a: ArrayLike, b: ArrayLike, t: ArrayLike) -> Array:
     """Parametric form: the points a + t (b - a) (..., 2 or 3)."""
     a = coordinates(a, "a")
-    return np.asarray(a + checked_numbers(t, "t")[..., None] * (coordinates(b, "b") - a))
+    return np.asarray(a + checked_array(t, "t")[..., None] * (coordinates(b, "b") - a))
 
 
 def implicit_line(a: ArrayLike, b: ArrayLike) -> tuple[Array, Array, Array]:

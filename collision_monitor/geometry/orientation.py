@@ -17,6 +17,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from collision_monitor.checks.numbers import real_array
 from collision_monitor.errors import InputError, TooCostlyError
 from collision_monitor.geometry.coordinates import Array
 
@@ -86,7 +87,10 @@ def orient3d(a: ArrayLike, b: ArrayLike, c: ArrayLike, p: ArrayLike) -> Array:
 
 
 def _together(width: int, *points: ArrayLike) -> list[Array]:
-    arrays = [np.asarray(point, dtype=np.float64) for point in points]
+    try:
+        arrays = [real_array(point) for point in points]
+    except (TypeError, ValueError, OverflowError):
+        raise InputError(f"expected points of shape (..., {width}), got something else than numbers") from None
     if any(array.shape[-1:] != (width,) for array in arrays):
         raise InputError(f"expected points of shape (..., {width}), got {[array.shape for array in arrays]}")
     if not all(np.isfinite(array).all() for array in arrays):

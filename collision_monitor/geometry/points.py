@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from collision_monitor.checks.numbers import checked_array
 from collision_monitor.errors import ShapeError
-from collision_monitor.geometry.coordinates import Array, Booleans, checked_numbers, coordinates
+from collision_monitor.geometry.coordinates import Array, Booleans, coordinates
 from collision_monitor.geometry.orientation import orient2d
 from collision_monitor.tolerances import EPSILON
 
@@ -24,7 +25,7 @@ def points_coincide(p: ArrayLike, q: ArrayLike, threshold: float = 0.0) -> Boole
     Uses the distance, because the slide's comparison per coordinate lacks the absolute value and accepts distant
     points.
     """
-    return np.asarray(point_distance(p, q) <= checked_numbers(threshold, "threshold", 0.0))
+    return np.asarray(point_distance(p, q) <= checked_array(threshold, "threshold", least=0.0))
 
 
 def closest_point_on_segment(p: ArrayLike, a: ArrayLike, b: ArrayLike) -> tuple[Array, Array]:
@@ -48,7 +49,7 @@ def point_on_segment(p: ArrayLike, a: ArrayLike, b: ArrayLike, tolerance: float 
     With a tolerance (m), the test is whether p is within that distance of the segment.
     """
     p, a, b = coordinates(p, "p"), coordinates(a, "a"), coordinates(b, "b")
-    if checked_numbers(tolerance, "tolerance", 0.0) > 0.0:
+    if checked_array(tolerance, "tolerance", least=0.0) > 0.0:
         return points_coincide(p, closest_point_on_segment(p, a, b)[0], tolerance)
     result = ((np.minimum(a, b) <= p) & (p <= np.maximum(a, b))).all(axis=-1)
     for pair in ([0, 1], [1, 2], [2, 0])[: 1 if p.shape[-1] == 2 else 3]:
@@ -58,7 +59,7 @@ def point_on_segment(p: ArrayLike, a: ArrayLike, b: ArrayLike, tolerance: float 
 
 def height_above_ground(p: ArrayLike, ground: ArrayLike = 0.0) -> Array:
     """Heights (m) of points (..., 3) above z = ground; a collision if <= 0. (Slide "point-ground plane")"""
-    return np.asarray(coordinates(p, "p", 3)[..., 2] - checked_numbers(ground, "ground"))
+    return np.asarray(coordinates(p, "p", 3)[..., 2] - checked_array(ground, "ground"))
 
 
 class Plane(NamedTuple):

@@ -17,6 +17,7 @@ from collision_monitor.geometry.crossing_filter import UNDECIDED, tabulate_cross
 from collision_monitor.geometry.lines import segments_intersect
 from collision_monitor.geometry.orientation import orient2d, orient3d
 from collision_monitor.geometry.point_in_polygon import Location
+from collision_monitor.tolerances import EPSILON
 
 POINTS_AT_ONCE: Final = (256, 4096)
 """Least and most points located together in a mesh. Larger: more faces are near some of them. Smaller: more iterations.
@@ -26,11 +27,57 @@ TESTS_AT_ONCE: Final = 1 << 15
 """Pairs of a point and a face tested together if that allows more than the least number of points. Larger: no faster.
 Smaller: meshes of a few faces take several times as long."""
 
+COPLANAR: Final = 32 * EPSILON
+"""Height of a corner of a triangle above the plane of its neighbour, as part of the size, up to which both are one
+face. Vertices have round-off of a few EPSILON."""
+
 
 def mesh_edges(faces: ArrayLike) -> Indices:
     """Edges (k, 2) of a mesh's faces (m, 3) without duplicates, smaller vertex index first, sorted."""
     faces = np.asarray(faces, dtype=np.int64)
     return np.unique(np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1), axis=0)
+
+
+class FlatFaces(NamedTuple):
+    """The faces of a polyhedron, each of one or more triangles in a plane, and the edges between two of them.
+
+    face (m,): number of the face of each triangle. edges (k, 2): vertices, smaller index first, sorted.
+    """
+
+    face: Indices
+    edges: Indices
+
+
+def flat_faces(vertices: Array, faces: Indices) -> FlatFaces:
+    """Join the triangles (m, 3) of a surface that lie in one plane, up to the round-off of their vertices (n, 3).
+
+    A diagonal of a face is no edge of the polyhedron. An edge that does not belong to two triangles stays one.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    corners = vertices[faces] - vertices[faces[0, 0]]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    normals = normals / np.where(length > 0.0, length, 1.0)
+    ends = np.sort(faces[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)  # the edge opposite to each corner
+    order = np.lexsort(ends.T[::-1])
+    edges, first, count = np.unique(ends[order], axis=0, return_index=True, return_counts=True)
+    pair = first[count == 2]
+    one, other = order[pair], order[pair + 1]  # the corners opposite to an edge of two triangles
+    apex = corners.reshape(-1, 3)
+    height_one = np.einsum("ki,ki->k", normals[other // 3], apex[one] - apex[_next(other)])
+    height_other = np.einsum("ki,ki->k", normals[one // 3], apex[other] - apex[_next(one)])
+    flat = np.maximum(np.abs(height_one), np.abs(height_other)) <= COPLANAR * np.abs(corners).max()
+    is_edge = np.ones(len(edges), bool)
+    is_edge[np.flatnonzero(count == 2)[flat]] = False
+    joined = coo_array((np.ones(flat.sum()), (one[flat] // 3, other[flat] // 3)), (len(faces), len(faces)))
+    return FlatFaces(connected_components(joined, directed=False)[1].astype(np.int64), edges[is_edge])
+
+
+def _next(corner: Indices) -> Indices:
+    """Return the corner behind another one of the same triangle."""
+    return corner - corner % 3 + (corner + 1) % 3
 
 
 def is_closed(faces: ArrayLike) -> bool:

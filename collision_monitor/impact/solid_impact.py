@@ -80,7 +80,8 @@ def solid_impact(table, parts, pair, window, tube, query, ending, scratch):
         if child < 0.0:
             enough = (keep * size_of(blocks, i, k) + gap) / speed  # points have no size
             soon, examined = leaf_solid_time(blocks, block, solid, gap, enough, memory)
-            steps += EXAMINED * examined
+            if not is_early:
+                steps += EXAMINED * examined
             if is_early and t + soon <= t:
                 return UNRESOLVED, t, 1 + steps // STEPS, gap
             if soon == 0.0:

@@ -56,7 +56,7 @@ def _extents(tree, directions, out, work):
         out[k] = farthest(tree, 0, (directions[k, 0], directions[k, 1], directions[k, 2]), work)
 
 
-def extents(tree: Array, directions: Array) -> Array:
+def tree_extents(tree: Array, directions: Array) -> Array:
     """Largest d . x (k,) in m over the points x of a tree, for directions d (k, 3) in its frame."""
     out = np.empty(len(directions))
     _extents(tree, np.ascontiguousarray(directions), out, np.empty(MEMORY))

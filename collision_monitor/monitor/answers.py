@@ -25,6 +25,7 @@ from collision_monitor.monitor.result import Refused, StepResult, StepStatus
 from collision_monitor.monitor.state.roster import count_bodies
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
+from collision_monitor.motion.motion import age_of
 from collision_monitor.narrow_phase.contact_row import (
     BOUND,
     DISTANCE,
@@ -63,14 +64,15 @@ class Answers(Stage):
         multibody = step.roster.multibody
         contacts = np.empty(len(active.pairs), records.CONTACT)
         if len(contacts):
-            b = step.roster.bodies
-            columns = b.model, multibody.parts.index
+            p = step.profile
+            limits = StaleLimits(step.now, p.stale_after, p.stale_acceleration, p.contact_margin)
             details, faces = step.profile.contact_details, step.roster.mesh_faces
             if details and len(faces):
                 table = faces.table(len(multibody.table.kind))
                 scratch = np.empty((1, 4)), np.empty((2, 3, 3))
                 name_mesh_features(multibody, active.pairs, active.results, step.now, table, scratch)
-            n = write_contacts(active.pairs, active.results, *columns, step.now, details, contacts)
+            index, bodies = multibody.parts.index, step.roster.bodies
+            n = write_contacts(active.pairs, active.results, bodies, index, limits, details, contacts)
             contacts = contacts[:n]
         if step.profile.contact_points > 1:
             contacts = with_patches(contacts, multibody, active.active, step.now, step.profile.contact_points)
@@ -199,14 +201,33 @@ def _leave_out_details(contact):
     contact.feature_type_a = contact.feature_index_a = contact.feature_type_b = contact.feature_index_b = 0
 
 
+class StaleLimits(NamedTuple):
+    """When a body is stale, and how far it may have left its last motion by then."""
+
+    now: float  # s
+    stale_after: float  # s
+    acceleration: float  # m/s^2
+    margin: float  # m: pairs up to this far apart touch
+
+
+@inlined
+def _is_in_doubt(bodies, i, j, distance, limits):
+    """Whether a pair may be farther apart than the margin, because one of its bodies is stale."""
+    age_i, age_j = age_of(bodies, i, limits.now), age_of(bodies, j, limits.now)
+    if not (age_i > limits.stale_after or age_j > limits.stale_after):
+        return False
+    widened = 0.5 * limits.acceleration * (age_i * age_i + age_j * age_j)
+    return distance + widened + bodies.excess[i] + bodies.excess[j] > limits.margin
+
+
 @kernel
-def write_contacts(pairs, results, model, shape_index, now, has_details, contacts):
+def write_contacts(pairs, results, bodies, shape_index, limits, has_details, contacts):
     """Write the contacts (records.CONTACT) of the pairs that touch or have just ended; return their number.
 
-    results (n, RESULT): of the pairs. model (N,): column of Bodies. shape_index (S,): a shape's place in its object's
-    description. has_details: whether there are witness points, features and closing speeds.
+    results (n, RESULT): of the pairs. shape_index (S,): a shape's place in its object's description. limits:
+    StaleLimits. has_details: whether there are witness points, features and closing speeds.
     """
-    n = 0
+    now, n = limits.now, 0
     for k in range(pairs.size):
         pair, row = pairs[k], results[k]
         if pair.touching == 0 and pair.touched == 0:
@@ -214,7 +235,7 @@ def write_contacts(pairs, results, model, shape_index, now, has_details, contact
         contact = contacts[n]
         contact.id_a, contact.id_b = ids_of(pair.key)
         contact.duration = now - pair.since
-        contact.model_a, contact.model_b = model[pair.i], model[pair.j]
+        contact.model_a, contact.model_b = bodies.model[pair.i], bodies.model[pair.j]
         contact.point_index, contact.point_count = 0, 1
         if pair.touching == 1:
             contact.signed_distance = row[DISTANCE]
@@ -229,6 +250,8 @@ def write_contacts(pairs, results, model, shape_index, now, has_details, contact
             contact.feature_type_b, contact.feature_index_b = int(row[FEATURE_TYPE_B]), int(row[FEATURE_INDEX_B])
             contact.phase = PERSIST if pair.touched == 1 else BEGIN
             contact.status = int(row[STATUS])
+            if _is_in_doubt(bodies, pair.i, pair.j, row[DISTANCE], limits):
+                contact.status = UNSETTLED
             if not has_details:
                 _leave_out_details(contact)
         else:

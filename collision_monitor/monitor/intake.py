@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from collision_monitor import records
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor._jit.direct import direct
+from collision_monitor.checks.numbers import as_numbers, hides_some
 from collision_monitor.errors import InputError, Refusal
 from collision_monitor.monitor.refusals import Refusals, some_ids
 from collision_monitor.monitor.state.roster import Roster
@@ -107,6 +108,8 @@ class Intake(Stage):
         """
         try:
             given = np.asarray(ids)
+            if hides_some(ids):
+                raise ValueError
         except ValueError:
             raise InputError(f"ids: expected one dimension of integers, got {ids!r}") from None
         if given.size == 0:
@@ -117,10 +120,7 @@ class Intake(Stage):
             states = _states(given, poses, twists)
         if covariance is None:
             return states, np.empty((0, 12))
-        try:
-            covariances = np.asarray(covariance, dtype=np.float64)
-        except (TypeError, ValueError, OverflowError):
-            raise InputError("covariance: expected an array of numbers") from None
+        covariances = as_numbers(covariance, "covariance", "an array of numbers")
         if covariances.shape != (len(states), 12):
             raise InputError(f"covariance: expected shape ({len(states)}, 12), got {covariances.shape}")
         known, stddevs = worst_stddevs(covariances)
@@ -252,12 +252,9 @@ def _states(ids: NDArray[Any], poses: Any, twists: Any) -> States:
     """Build states from ids (N,), poses (N, 7) and twists (N, 6). Raises InputError."""
     if ids.ndim != 1 or not np.issubdtype(ids.dtype, np.integer):
         raise InputError(f"ids: expected one dimension of integers, got {ids.dtype} of shape {ids.shape}")
-    try:
-        pose = np.asarray(poses, dtype=np.float64)
-        twist = np.zeros((len(ids), 6)) if twists is None else np.asarray(twists, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError("poses and twists: expected arrays of numbers") from None
     n = len(ids)
+    pose = as_numbers(poses, "poses and twists", "arrays of numbers")
+    twist = np.zeros((n, 6)) if twists is None else as_numbers(twists, "poses and twists", "arrays of numbers")
     if pose.shape != (n, 7) or twist.shape != (n, 6):
         raise InputError(
             "expected ids (N,), poses (N, 7), x y z qx qy qz qw, and twists (N, 6), linear, angular; "

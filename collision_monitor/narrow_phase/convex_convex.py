@@ -65,7 +65,8 @@ def cores_contact(
     px, py, pz = pose.p
     A, B = cores.A, cores.B
     ra, rb = radii
-    count, lower, normal = gjk(cores, work, size, limit + ra + rb, EXACT)
+    round_off = SAT_ROUND_OFF * (size + abs(px) + abs(py) + abs(pz) + ra + rb)
+    count, lower, normal = gjk(cores, work, size, limit + ra + rb + round_off, EXACT)
     if count == 0:
         return False
     curved = CURVED[A.kind] or CURVED[B.kind]
@@ -102,7 +103,7 @@ def cores_contact(
                 bound = off
         distance = -depth
         bound += GJK_TOUCHING * size
-    bound += SAT_ROUND_OFF * (size + abs(px) + abs(py) + abs(pz) + ra + rb)
+    bound += round_off
     # the radius moves A's surface that much along the normal
     point_a = along(point_a, ra, normal)
     write(out, distance - ra - rb, rotate(pose.R_A, normal), rotate(pose.R_A, point_a), bound)

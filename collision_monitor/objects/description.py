@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, Final
 
+from collision_monitor.checks.numbers import checked_number
 from collision_monitor.errors import InputError, ShapeError
 from collision_monitor.records import Model
 from collision_monitor.shapes.compound import shape_pairs
@@ -34,16 +35,6 @@ def _uint32(value: Any, what: str) -> int:
     if not 0 <= number <= _UINT32_MAX:
         name = "; a text goes into name=" if isinstance(value, str) else ""
         raise InputError(f"{what}: expected an integer from 0 to {_UINT32_MAX}, got {value!r:.100}{name}")
-    return number
-
-
-def _not_negative(value: Any, what: str, unit: str) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{what}: expected a number of {unit}, got {value!r}") from None
-    if not 0.0 <= number <= LARGEST_INPUT:
-        raise InputError(f"{what}: expected a finite number of {unit} from 0 to {LARGEST_INPUT:g}, got {number!r}")
     return number
 
 
@@ -78,7 +69,7 @@ class ObjectDescription:
     the message may omit get their defaults here: an empty name, a group or mask of 0, an acceleration of NaN.
     Raises InputError; ShapeError for the shapes.
 
-    >>> from collision_monitor.shapes.shapes import Sphere
+    >>> from collision_monitor.shapes.registry import Sphere
     >>> ObjectDescription(7, Sphere(0.5), name="ball").name
     'ball'
     """
@@ -119,13 +110,14 @@ class ObjectDescription:
             "static": bool(self.static),
             "group": _uint32(self.group, f"{what}, group") or 1,
             "mask": _uint32(self.mask, f"{what}, mask") or ALL_GROUPS,
-            "padding": _not_negative(self.padding, f"{what}, padding", "metres"),
+            "padding": checked_number(self.padding, f"{what}, padding", "metres", least=0.0, most=LARGEST_INPUT),
             "model": model,
             "allowed": tuple(_uint32(other, f"{what}, allowed") for other in _ids(self.allowed, f"{what}, allowed")),
         }
         for field, unit in (("max_linear_acceleration", "m/s^2"), ("max_angular_acceleration", "rad/s^2")):
             value = getattr(self, field)
             unknown = isinstance(value, float) and math.isnan(value)
-            checked[field] = 0.0 if unknown else _not_negative(value, f"{what}, {field}", unit)
+            name = f"{what}, {field}"
+            checked[field] = 0.0 if unknown else checked_number(value, name, unit, least=0.0, most=LARGEST_INPUT)
         for field, value in checked.items():
             object.__setattr__(self, field, value)

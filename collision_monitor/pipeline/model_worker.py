@@ -59,7 +59,8 @@ def receive(stream: IO[bytes]) -> bytes:
     return data
 
 
-def _limit() -> None:
+def limit_this_process() -> None:
+    """Set the limits of time, memory and priority, and end with the parent."""
     signal.alarm(START_S)  # its default action ends the process, also within native code
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the monitor, which ends this process
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -93,7 +94,7 @@ def _make(data: bytes, number: int) -> bytes:
 
 def main() -> None:
     """Process jobs until the parent closes the pipe."""
-    _limit()
+    limit_this_process()
     results = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # a library's output must not mix with the models
     while True:  # ends with the parent, at the limit of time, or when the pipe is closed

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, Final
@@ -14,9 +14,11 @@ from numpy.typing import NDArray
 
 from collision_monitor._version import VERSION
 from collision_monitor.alerts.alerts import Alerts
+from collision_monitor.alerts.missing_objects import MissingObject
 from collision_monitor.alerts.rules import Rules
 from collision_monitor.codec import (
     Change,
+    CollisionAlertArray,
     MonitorStatus,
     encode_alert,
     encode_alerts,
@@ -221,21 +223,24 @@ class Pipeline:
         self._alerts.use(rules)
         return encode_settings(stamp_ns, node, {RULES: rules.text})
 
-    @property
-    def has_raised_alerts(self) -> bool:
-        """Whether any alert is raised."""
-        return self._alerts.has_raised
+    def raised_alerts(self, missing: Iterable[MissingObject] = (), number: int = 0) -> bytes:
+        """Return the bytes of `raised_alert_array`."""
+        return encode_alerts(self.raised_alert_array(missing, number))
 
-    def raised_alerts(self) -> bytes:
-        """Return a CollisionAlertArray of all alerts that are raised, with the measures of the last step."""
+    def raised_alert_array(self, missing: Iterable[MissingObject] = (), number: int = 0) -> CollisionAlertArray:
+        """Return all alerts that are raised, with the measures of the last step, and what guards need.
+
+        missing: what is asked for and not monitored. number: of the monitor.
+        """
         last = self.monitor.last
         stamp_ns, step = (last.stamp_ns, last.step) if last is not None else (0, 0)
-        return encode_alerts(self._alerts.raised(stamp_ns, self.frame_id, step))
+        raised = self._alerts.raised(stamp_ns, self.frame_id, step)
+        return self._alerts.for_guards(raised, self.monitor, missing, number)
 
     @property
     def empty_classes(self) -> list[str]:
-        """The classes of the rules that no object belongs to, as of the last step."""
-        return self._alerts.empty_classes
+        """The classes of the rules that no object belongs to."""
+        return self._alerts.empty_classes(self.monitor.roster)
 
     # -- what the monitor says of its inputs
 
@@ -258,6 +263,11 @@ class Pipeline:
     def restarts(self) -> int:
         """Number of times that the timeline restarted because time jumped."""
         return self.monitor.restarts
+
+    @property
+    def has_begun(self) -> bool:
+        """Whether there was a step."""
+        return self.monitor.last is not None
 
     def stale(self) -> dict[int, str]:
         """Return the names of the objects that are stale at the latest time, by id."""

@@ -16,6 +16,9 @@ SOURCES: Final = "~/sources"
 RULES: Final = "~/rules"
 """Topic of a String with the rules of the alerts (YAML), from a latched publisher."""
 
+RULES_IN_FORCE: Final = "~/rules_in_force"
+"""Topic of a DiagnosticArray about the rules of the alerts, and whom each of them covers at this moment; latched."""
+
 GUARD_STATE: Final = "~/state"
 """Topic of a String on which the guard, a node of its own, explains what it does with the commands."""
 

@@ -8,6 +8,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.checks.numbers import checked_rows, real_array
 from collision_monitor.errors import InputError, PoseError, ShapeError
 from collision_monitor.meshes.trees.shape_trees import CERTAIN
 from collision_monitor.query.body import kept_slots, plant
@@ -73,8 +74,8 @@ def pose_rows(value: Any, name: str) -> Array:
     if isinstance(value, Sequence) and len(value) and any(isinstance(pose, Pose) for pose in value):
         return np.array([as_pose(pose, f"{name}, {k}").numbers for k, pose in enumerate(value)])
     try:
-        found = np.array(value, dtype=np.float64)
-    except (TypeError, ValueError):
+        found = real_array(value)
+    except (TypeError, ValueError, OverflowError):
         got = type(value).__name__
         raise PoseError(f"{name}: expected poses as rows (N, 7), or a list of Pose, got {got}") from None
     if found.shape[-2:] == (4, 4):
@@ -82,7 +83,7 @@ def pose_rows(value: Any, name: str) -> Array:
         return np.array([Pose.from_matrix(matrix).numbers for matrix in matrices]).reshape(-1, 7)
     if found.ndim in (1, 2) and found.shape[-1] == 3:
         found = np.concatenate([np.atleast_2d(found), np.tile([0.0, 0.0, 0.0, 1.0], (found.size // 3, 1))], axis=1)
-    rows = number_rows(found, 7, name)
+    rows = checked_rows(found, 7, name, LARGEST_INPUT, PoseError)
     norm = np.sqrt(np.einsum("ni,ni->n", rows[:, 3:], rows[:, 3:]))
     bad = np.flatnonzero(~(np.abs(norm - 1.0) <= UNIT_QUATERNION))
     if len(bad):
@@ -97,20 +98,6 @@ def pose_rows(value: Any, name: str) -> Array:
 def pose_of(row: Array) -> Pose:
     """Pose of a row of `pose_rows` to the bit: normalising its quaternion again could change the last one."""
     return Pose.of_numbers(row[:7].tolist())
-
-
-def number_rows(value: Any, width: int, name: str) -> Array:
-    """Copy of an array (N, width) of finite numbers; one row may lack its dimension. Raises InputError, PoseError."""
-    try:
-        rows = np.atleast_2d(np.array(value, dtype=np.float64))
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: expected numbers (N, {width}), got {type(value).__name__}") from None
-    if rows.ndim != 2 or rows.shape[1] != width:
-        raise InputError(f"{name}: expected an array (N, {width}), got shape {np.shape(value)}")
-    bad = np.flatnonzero(~(np.abs(rows) <= LARGEST_INPUT).all(axis=1))
-    if len(bad):
-        raise PoseError(f"{name}: expected finite numbers up to {LARGEST_INPUT:g}, got others in row {bad[0]}")
-    return np.ascontiguousarray(rows)
 
 
 def pair_count(**lengths: int) -> int:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Final
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -15,7 +14,7 @@ from matplotlib.patches import Patch
 from collision_monitor.report.alert_bars import alert_figure
 from collision_monitor.report.facts import ReportFacts
 from collision_monitor.report.from_above import from_above
-from collision_monitor.report.rendering import CONTACT, INK, PALETTE, POSSIBLE, STYLE, WARNING, Size
+from collision_monitor.report.rendering import CONTACT, INK, PALETTE, POSSIBLE, WARNING, Size, styled
 from collision_monitor.session.history.alerts import stated_error
 from collision_monitor.session.history.history import CollisionEvent, Floats, History, Pair
 from collision_monitor.settings.names import shortened
@@ -45,9 +44,9 @@ def figures(history: History, facts: ReportFacts, size: Size) -> dict[str, Figur
         "predicted": _predicted,
         "distances": _distances,
         "events": from_above,
-        "steps": _steps,
+        "steps": lambda history, _, size: _steps(history, size),
     }
-    with mpl.rc_context(STYLE):
+    with styled():
         drawn = {name: function(history, facts, size) for name, function in draw.items()}
     return {name: figure for name, figure in drawn.items() if figure is not None}
 
@@ -206,7 +205,7 @@ def _distances(history: History, facts: ReportFacts, size: Size) -> Figure | Non
     return figure
 
 
-def _steps(history: History, facts: ReportFacts, size: Size) -> Figure | None:
+def _steps(history: History, size: Size) -> Figure | None:
     if not len(history.durations):
         return None
     milliseconds = history.durations * 1e3

@@ -101,11 +101,11 @@ def write_report(
     files = {Path(path): page(history, facts, drawn).encode("utf-8", errors="replace")}
     if pictures is not None:
         files |= {Path(pictures) / f"{name}.png": as_png(figure) for name, figure in broad.items()}
-    try:
-        for file, content in files.items():
+    for file, content in files.items():
+        try:
             file.write_bytes(content)
-    except OSError as error:
-        raise SessionError(f"{error.filename}: expected to be able to write there, got: {error.strerror}") from None
+        except OSError as error:  # one of writing, such as a full disk, names no file
+            raise SessionError(f"{file}: expected to be able to write there, got: {error.strerror}") from None
     return list(files)
 
 

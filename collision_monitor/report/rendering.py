@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BytesIO
+from threading import RLock
 from typing import Any, Final
 
 import matplotlib as mpl
@@ -31,6 +34,10 @@ STYLE: Final[Any] = {
     "text.parse_math": False,  # a name may contain a dollar sign
     **dict.fromkeys(("text.color", "axes.labelcolor", "axes.edgecolor", "xtick.color", "ytick.color"), INK),
 }
+
+
+_STYLED: Final = RLock()
+"""Held while Matplotlib's settings, which belong to the whole process, are those of the report."""
 
 
 @dataclass(frozen=True)
@@ -73,9 +80,16 @@ def as_png(figure: Figure) -> bytes:
     return _saved(figure, format="png", dpi=150, metadata={"Software": None})
 
 
+@contextmanager
+def styled() -> Iterator[None]:
+    """Draw in the report's style within the block. One thread at a time, because the style is the whole process's."""
+    with _STYLED, mpl.rc_context(STYLE):
+        yield
+
+
 def _saved(figure: Figure, **options: Any) -> bytes:
     buffer = BytesIO()
-    with mpl.rc_context(STYLE), warnings.catch_warnings():
+    with styled(), warnings.catch_warnings():
         warnings.filterwarnings("ignore", "Glyph .* missing from font")  # for names in other scripts
         figure.savefig(buffer, **options)
     return buffer.getvalue()

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from collision_monitor.checks.numbers import as_numbers, checked_array
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.coordinates import Array, checked_numbers, coordinates
+from collision_monitor.geometry.coordinates import Array, coordinates
 from collision_monitor.tolerances import LARGEST_INPUT
 
 
@@ -41,7 +42,7 @@ def unit(value: ArrayLike, name: str = "normal") -> Array:
 
 def restitutions(value: ArrayLike) -> Array:
     """Coefficients of restitution (..., 1) from 0 to 1. Raises InputError."""
-    array = checked_numbers(value, "restitution")
+    array = checked_array(value, "restitution")
     if not ((array >= 0.0) & (array <= 1.0)).all():
         raise InputError(f"restitution: expected 0 (no bounce) to 1 (elastic), got {value!r:.100}")
     return array[..., None]
@@ -49,15 +50,7 @@ def restitutions(value: ArrayLike) -> Array:
 
 def masses(value: ArrayLike, name: str = "mass") -> Array:
     """Masses (..., 1) in kg, positive; infinity is an immovable body. Raises InputError."""
-    try:
-        array = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: expected numbers of kilograms, got {value!r:.100}") from None
+    array = as_numbers(value, name, "numbers of kilograms")
     if not (array > 0.0).all():
         raise InputError(f"{name}: expected positive kilograms (infinity for an immovable body), got {value!r:.100}")
     return array[..., None]
-
-
-def checked_not_negative(value: ArrayLike, name: str) -> Array:
-    """Finite numbers (...) of at least 0. Raises InputError."""
-    return checked_numbers(value, name, 0.0)

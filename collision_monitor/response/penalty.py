@@ -7,9 +7,10 @@ from math import pi
 import numpy as np
 from numpy.typing import ArrayLike
 
+from collision_monitor.checks.numbers import checked_array
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.coordinates import Array, checked_numbers
-from collision_monitor.response.checks import checked_not_negative, masses, restitutions, unit
+from collision_monitor.geometry.coordinates import Array
+from collision_monitor.response.checks import masses, restitutions, unit
 
 
 def penalty_force(
@@ -21,8 +22,8 @@ def penalty_force(
     spring force", "Collision response: penalty" and ": damped". The force never pulls, as a damper alone would hold the
     body on the surface on its way out.
     """
-    d, speed, n = checked_numbers(depth, "depth"), checked_numbers(closing_speed, "closing speed"), unit(normal)
-    spring, damper = checked_not_negative(stiffness, "stiffness"), checked_not_negative(damping, "damping")
+    d, speed, n = checked_array(depth, "depth"), checked_array(closing_speed, "closing speed"), unit(normal)
+    spring, damper = checked_array(stiffness, "stiffness", least=0.0), checked_array(damping, "damping", least=0.0)
     push = np.maximum(spring * d + damper * speed, 0.0)
     return np.asarray(np.where(d > 0.0, push, 0.0)[..., None] * n)
 
@@ -32,7 +33,7 @@ def spring_stiffness(mass: ArrayLike, speed: ArrayLike, depth: ArrayLike) -> Arr
 
     Raises InputError for an infinite mass and a depth that is not positive.
     """
-    m, v, d = masses(mass)[..., 0], checked_numbers(speed, "speed"), checked_numbers(depth, "depth")
+    m, v, d = masses(mass)[..., 0], checked_array(speed, "speed"), checked_array(depth, "depth")
     if not (np.isfinite(m).all() and (d > 0.0).all()):
         raise InputError("spring: expected a finite mass and a positive depth")
     return np.asarray(m * (v / d) ** 2)
@@ -44,7 +45,7 @@ def damping_for(restitution: ArrayLike, stiffness: ArrayLike, mass: ArrayLike) -
     A half period of the damped oscillation multiplies the speed by exp(-c pi / sqrt(4 k m - c²)); the force of
     `penalty_force` ends earlier, because it never pulls, so a bounce is livelier than stated, by up to 0.1 below 0.5.
     """
-    e, k, m = restitutions(restitution)[..., 0], checked_not_negative(stiffness, "stiffness"), masses(mass)[..., 0]
+    e, k, m = restitutions(restitution)[..., 0], checked_array(stiffness, "stiffness", least=0.0), masses(mass)[..., 0]
     if not (e > 0.0).all():
         raise InputError("restitution: expected above 0 for a damper, got 0, which no finite damping reaches")
     decay = -np.log(e)

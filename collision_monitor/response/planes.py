@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from collision_monitor.geometry.coordinates import Array, checked_numbers
-from collision_monitor.response.checks import checked_direction, checked_not_negative, restitutions, unit, vectors
+from collision_monitor.checks.numbers import checked_array
+from collision_monitor.geometry.coordinates import Array
+from collision_monitor.response.checks import checked_direction, restitutions, unit, vectors
 
 
 def normal_part(vector: Array, normal: Array) -> Array:
@@ -56,6 +57,6 @@ def _depth(position: ArrayLike, normal: ArrayLike, offset: ArrayLike, radius: Ar
     p, _ = vectors(("position", position), ("normal", normal))
     n, reach = (
         unit(normal),
-        checked_numbers(offset, "offset")[..., None] + checked_not_negative(radius, "radius")[..., None],
+        checked_array(offset, "offset")[..., None] + checked_array(radius, "radius", least=0.0)[..., None],
     )
     return p, n, np.asarray(reach - np.sum(p * n, axis=-1, keepdims=True))

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from collision_monitor.checks.numbers import as_numbers, checked_array
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.coordinates import Array, checked_numbers
-from collision_monitor.response.checks import checked_not_negative
+from collision_monitor.geometry.coordinates import Array
 from collision_monitor.response.contact_set import Bodies, Contacts, solve
 
 
@@ -46,15 +46,15 @@ def hold_contacts(
     """
     count = len(contacts.a)
     contacts.check(len(bodies.inverse_mass))
-    start = np.zeros((count, 3)) if impulse is None else np.array(impulse, dtype=np.float64)
+    start = np.zeros((count, 3)) if impulse is None else np.array(as_numbers(impulse, "impulse"))
     if start.shape != (count, 3):
         raise InputError(f"impulse: expected shape ({count}, 3), one row for each contact, got {start.shape}")
     target, mu, budget = (
         np.broadcast_to(value, count).astype(np.float64)
         for value in (
-            checked_numbers(opening, "opening"),
-            checked_not_negative(friction, "friction"),
-            checked_not_negative(earlier, "earlier"),
+            checked_array(opening, "opening"),
+            checked_array(friction, "friction", least=0.0),
+            checked_array(earlier, "earlier", least=0.0),
         )
     )
     after, used = solve(bodies, contacts, target, mu, budget, start, iterations, tolerance)

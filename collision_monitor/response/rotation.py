@@ -7,9 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from collision_monitor.checks.numbers import as_numbers, checked_array
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.coordinates import Array, coordinates
-from collision_monitor.response.checks import checked_not_negative, masses, restitutions, unit, vectors
+from collision_monitor.response.checks import masses, restitutions, unit, vectors
 
 
 class RigidBody(NamedTuple):
@@ -42,7 +43,7 @@ def collide_rotating(
     states. (Slide "Additional issues": adding physics for rotation; Mirtich, 1996)
     """
     p, n = coordinates(point, "point", 3), unit(normal)
-    e, mu = restitutions(restitution), checked_not_negative(friction, "friction")[..., None]
+    e, mu = restitutions(restitution), checked_array(friction, "friction", least=0.0)[..., None]
     va, wa, arm_a, inverse_a, k_a = _at_point(a, p, "A")
     vb, wb, arm_b, inverse_b, k_b = _at_point(b, p, "B")
     k = k_a + k_b
@@ -74,7 +75,7 @@ def _at_point(body: RigidBody, point: Array, name: str) -> tuple[Array, Array, A
     )  # fmt: skip
     if any(array.shape[-1] != 3 for array in (v, w, x)):
         raise InputError(f"body {name}: expected vectors of space, shape (..., 3)")
-    mass, inertia = masses(body.mass, f"mass {name}"), np.asarray(body.inertia, dtype=np.float64)
+    mass, inertia = masses(body.mass, f"mass {name}"), as_numbers(body.inertia, f"inertia {name}")
     if inertia.shape[-2:] != (3, 3):
         raise InputError(f"inertia {name}: expected shape (..., 3, 3), got {inertia.shape}")
     movable = np.isfinite(mass)[..., None]

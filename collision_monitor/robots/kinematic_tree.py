@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.robots.urdf import Joint, JointType, Urdf
+from collision_monitor.tolerances import LARGEST_INPUT
 
 FIXED: Final = 0
 TURNING: Final = 1
@@ -120,6 +121,7 @@ def _tree(order: list[str], by_child: dict[str, Joint], urdf: Urdf) -> Kinematic
         np.zeros(count),
     )
     needs = np.zeros((count, len(column)), np.bool_)
+    leaders: dict[str, tuple[str, float, float]] = {}
     for i, name in enumerate(order[1:], start=1):
         joint = by_child[name]
         table.parent[i], table.kind[i] = row[joint.parent], _KINDS[joint.type]
@@ -127,23 +129,34 @@ def _tree(order: list[str], by_child: dict[str, Joint], urdf: Urdf) -> Kinematic
         table.axis[i] = joint.axis
         needs[i] = needs[table.parent[i]]
         if table.kind[i] != FIXED:
-            source, table.multiplier[i], table.offset[i] = _leader(joint, urdf)
+            source, table.multiplier[i], table.offset[i] = _leader(joint, urdf, leaders)
             table.variable[i] = column[source]
             needs[i, column[source]] = True
     wraps = np.array([joint.type is JointType.CONTINUOUS for joint in free], np.bool_)
     return KinematicTree(tuple(order), tuple(column), table, wraps, needs)
 
 
-def _leader(joint: Joint, urdf: Urdf) -> tuple[str, float, float]:
-    """Return the joint that this one follows in the end, and multiplier and offset of its position."""
-    multiplier, offset, seen = 1.0, 0.0, {joint.name}
-    at = joint
-    while at.mimic is not None:
-        offset += multiplier * at.mimic.offset
-        multiplier *= at.mimic.multiplier
+def _leader(
+    joint: Joint, urdf: Urdf, known: dict[str, tuple[str, float, float]]
+) -> tuple[str, float, float]:
+    """Return the joint that this one follows in the end, and multiplier and offset of its position.
+
+    known: the same for the joints so far, so that a chain of mimics is walked once.
+    """
+    chain, at = [], joint
+    seen = set()
+    while at.mimic is not None and at.name not in known:
+        chain.append(at)
+        seen.add(at.name)
         leader = urdf.joints.get(at.mimic.joint)
         if leader is None or leader.type not in _KINDS or leader.type is JointType.FIXED or leader.name in seen:
             raise at.element.error(f"mimic: expected a moving joint, and no loop, got {at.mimic.joint!r:.80}")
-        seen.add(leader.name)
         at = leader
-    return at.name, multiplier, offset
+    name, multiplier, offset = known.get(at.name, (at.name, 1.0, 0.0))
+    for each in reversed(chain):
+        assert each.mimic is not None
+        multiplier, offset = each.mimic.multiplier * multiplier, each.mimic.multiplier * offset + each.mimic.offset
+        if not (abs(multiplier) <= LARGEST_INPUT and abs(offset) <= LARGEST_INPUT):
+            raise each.element.error(f"mimic: expected a position up to {LARGEST_INPUT:g}, got a larger one")
+        known[each.name] = name, multiplier, offset
+    return name, multiplier, offset

@@ -9,9 +9,11 @@ from typing import Final
 from urllib.parse import unquote
 
 from collision_monitor.errors import InputError
+from collision_monitor.settings.regular_file import FOLDER, found_instead
 
 _PACKAGE_SCHEMES: Final = ("package://", "model://")
 _SHOWN: Final = 6
+_NO_NAMES: Final = ("", os.curdir, os.pardir)
 
 
 class FileLocator:
@@ -35,16 +37,20 @@ class FileLocator:
         if separator and scheme != "file":
             raise InputError(f"expected a path, file:// or package://, got {address!r:.200}")
         path = Path(unquote(rest)) if separator else self._folder / address
-        if not _is_file(path):
-            raise InputError(f"expected the file {path}, got none there")
+        if found := found_instead(path):
+            raise InputError(f"expected the file {str(path)!r:.200}, got {found}")
         return path
 
     def _in_package(self, name: str, rest: str, address: str) -> Path:
+        """Return the file below the folder of a package. A link in it may lead elsewhere, as those of colcon do."""
+        if name in _NO_NAMES or os.path.isabs(rest) or os.path.normpath(rest).split(os.sep)[0] == os.pardir:
+            raise InputError(f"expected package://PACKAGE/PATH with a path in the package, got {address!r:.200}")
         folders = [self._packages[name]] if name in self._packages else self._candidates(name)
-        for folder in folders:
-            if _is_file(folder / rest):
-                return folder / rest
-        searched = ", ".join(map(str, folders[:_SHOWN])) or "no folder"
+        found = [found_instead(folder / rest) for folder in folders]
+        if "" in found:
+            return folders[found.index("")] / rest
+        there = zip(folders[:_SHOWN], found, strict=False)
+        searched = ", ".join(f"{folder}: {what}" for folder, what in there) or "no folder"
         raise InputError(
             f"expected the file {address!r:.200} in the package {name!r:.80}, got none (searched: {searched}); "
             f"source the workspace that has it, or give its folder under `packages`"
@@ -56,15 +62,8 @@ class FileLocator:
             found += [Path(root) / name, Path(root)] if Path(root).name == name else [Path(root) / name]
         for folder in (self._folder, *self._folder.resolve().parents):
             found += [folder] if folder.name == name else [folder / name]
-        return [folder for folder in found if folder.is_dir()]
+        return [folder for folder in found if found_instead(folder) == FOLDER]
 
 
 def _paths(variable: str) -> list[str]:
     return [path for path in os.environ.get(variable, "").split(os.pathsep) if path]
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except ValueError:  # a path with a NUL
-        return False

@@ -6,10 +6,14 @@ Format: http://wiki.ros.org/srdf. Groups, states and end effectors are not read.
 from __future__ import annotations
 
 from collections.abc import Collection
+from typing import Final
 
-from collision_monitor.robots.xml_tree import Element, parse_xml
+from collision_monitor.settings.xml_tree import Element, parse_xml
 
 Pair = tuple[str, str]
+
+MOST_DISABLED: Final = 100_000
+"""Pairs that an SRDF may disable: all those of 450 links."""
 
 
 def ordered(a: str, b: str) -> Pair:
@@ -27,9 +31,14 @@ def disabled_pairs(text: str | bytes, name: str, links: Collection[str]) -> set[
     if robot.tag != "robot":
         raise robot.error("expected an SRDF with <robot> as its outermost element")
     silent = {element.text("link") for element in robot.all("disable_default_collisions")}
+    if len(silent) * len(links) > MOST_DISABLED:
+        raise robot.error(f"expected at most {MOST_DISABLED} pairs that are disabled, got {len(silent) * len(links)}")
     pairs = {ordered(a, b) for a in silent for b in links if a != b}
     pairs -= {_pair(element) for element in robot.all("enable_collisions")}
-    return pairs | {_pair(element) for element in robot.all("disable_collisions")}
+    pairs |= {_pair(element) for element in robot.all("disable_collisions")}
+    if len(pairs) > MOST_DISABLED:
+        raise robot.error(f"expected at most {MOST_DISABLED} pairs that are disabled, got {len(pairs)}")
+    return pairs
 
 
 def _pair(element: Element) -> Pair:

@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from itertools import combinations
+from typing import Final
 
+from collision_monitor.errors import InputError
 from collision_monitor.robots.kinematic_tree import FIXED, KinematicTree
 from collision_monitor.robots.srdf import Pair, ordered
+
+MOST_PAIRS: Final = 100_000
+"""Pairs of links that touch by construction: those of 450 links that are rigid with each other. A humanoid has 300."""
 
 
 def touching_links(tree: KinematicTree, solid: Collection[str]) -> set[Pair]:
@@ -15,6 +20,8 @@ def touching_links(tree: KinematicTree, solid: Collection[str]) -> set[Pair]:
     Links joined by fixed joints form one rigid body, and their pairs never change. At a moving joint the two links that
     it joins touch; instead of a link without a shape, the solid links of its rigid body; if there are none, the next
     body towards the base. Other pairs, such as the ends of a bent arm, stay checked.
+
+    Raises InputError beyond MOST_PAIRS.
     """
     table = tree.table
     top = list(range(len(tree.links)))  # row of the topmost link of the rigid body
@@ -25,6 +32,11 @@ def touching_links(tree: KinematicTree, solid: Collection[str]) -> set[Pair]:
     for name, row in zip(tree.links, top, strict=True):
         if name in solid:
             bodies.setdefault(row, []).append(name)
+    if (count := sum(len(links) * (len(links) - 1) // 2 for links in bodies.values())) > MOST_PAIRS:
+        raise InputError(
+            f"expected at most {MOST_PAIRS} pairs of links with shapes that fixed joints connect, got {count}: "
+            "give the shapes of such links to one of them"
+        )
     pairs = {ordered(a, b) for links in bodies.values() for a, b in combinations(links, 2)}
 
     def at(row: int) -> list[str]:
@@ -36,4 +48,6 @@ def touching_links(tree: KinematicTree, solid: Collection[str]) -> set[Pair]:
             row = int(table.parent[top[row]])
         if row >= 0:
             pairs |= {ordered(a, b) for a in at(i) for b in at(row)}
+            if len(pairs) > 2 * MOST_PAIRS:
+                raise InputError(f"expected at most {2 * MOST_PAIRS} pairs of links that joints connect, got more")
     return pairs

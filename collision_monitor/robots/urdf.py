@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.robots.xml_tree import Element, parse_xml
+from collision_monitor.settings.xml_tree import Element, parse_xml
 from collision_monitor.shapes.pose import Pose, from_rotation_vector, multiply
 
 MOST_LINKS: Final = 2000

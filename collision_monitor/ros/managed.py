@@ -14,9 +14,6 @@ from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallba
 
 from collision_monitor.errors import CollisionMonitorError
 
-UNCONFIGURED: Final = "unconfigured"
-INACTIVE: Final = "inactive"
-ACTIVE: Final = "active"
 FINALIZED: Final = "finalized"
 
 

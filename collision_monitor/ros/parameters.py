@@ -30,10 +30,18 @@ T = TypeVar("T", str, int, float, bool, str | int | float)
 _TYPES = {bool: "true or false", str: "a text", int: "a whole number", float: "a number"}
 
 
+def begin_node(node: Node, name: str) -> None:
+    """Initialise a node whose parameters a ParameterReader reads. Raises InputError for a value without a type."""
+    try:
+        Node.__init__(node, name, automatically_declare_parameters_from_overrides=True)
+    except ValueError as error:
+        raise InputError(f"parameters: expected a value with a type for each, got an empty list: {error}") from None
+
+
 class ParameterReader:
     """Declares the parameters of a node and returns their values.
 
-    The node must have `automatically_declare_parameters_from_overrides`. Then this class can refuse a misspelt name,
+    The node is one of `begin_node`, which declares what is given. So this class can refuse a misspelt name,
     which ROS would ignore, and accept a whole number for a decimal one (`-p horizon:=1`). Raises InputError.
     """
 

@@ -11,6 +11,7 @@ import signal
 import sys
 import threading
 import time
+import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -34,6 +35,12 @@ FINISH_S: Final = 0.9
 """Time (s) from a signal until `StopRequest.on_stuck` is called, if the process still runs: half of STOP_S is for the
 ordinary end, half for finishing a recording without the thread that is stuck."""
 
+
+FAILURE_PERIOD: Final = 10.0
+"""s between two lines of the log about the same error of a callback."""
+
+MOST_FAILURES: Final = 100
+"""Different errors whose last lines are remembered."""
 
 class StopRequest:
     """Set by SIGINT or SIGTERM. Further signals during the shutdown change nothing.
@@ -159,9 +166,27 @@ def spin(node: Node, stop: StopRequest, *, events: bool = False) -> None:
     else:
         executor = SingleThreadedExecutor()
     executor.add_node(node)
+    failures: dict[str, float] = {}
     try:
         while not stop.received:
-            executor.spin_once(timeout_sec=WAKE_UP)
+            try:
+                executor.spin_once(timeout_sec=WAKE_UP)
+            except Exception as error:  # one callback failed: the others go on
+                if not node.context.ok():
+                    raise
+                _log_failure(node, error, failures)
     finally:
         executor.remove_node(node)
         executor.shutdown()
+
+
+def _log_failure(node: Node, error: Exception, logged: dict[str, float]) -> None:
+    """Log an error of a callback that nobody expected, the same one every FAILURE_PERIOD at most. logged: when."""
+    text = "".join(traceback.format_exception(error, limit=-8))
+    now = time.monotonic()
+    if now - logged.get(text, -FAILURE_PERIOD) < FAILURE_PERIOD:
+        return
+    if len(logged) >= MOST_FAILURES:
+        logged.clear()
+    logged[text] = now
+    node.get_logger().error(f"a callback failed, the node goes on; please report this:\n{text}")

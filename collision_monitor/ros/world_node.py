@@ -12,11 +12,12 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
 from collision_monitor import codec
-from collision_monitor.errors import CollisionMonitorError, InputError
+from collision_monitor.checks.numbers import checked_number
+from collision_monitor.errors import CollisionMonitorError
 from collision_monitor.pipeline.topics import NODE, Topic
 from collision_monitor.ros.endpoints import publisher, subscription
 from collision_monitor.ros.names import check_node_name
-from collision_monitor.ros.parameters import ParameterReader
+from collision_monitor.ros.parameters import ParameterReader, begin_node
 from collision_monitor.ros.process import WAKE_UP, StopRequest
 from collision_monitor.world import make_scene, scene_names
 from collision_monitor.world.rigid.response_choice import METHODS
@@ -37,7 +38,7 @@ class WorldNode(Node):
     """Publishes one scene to one monitor. Raises InputError for an impossible scene or parameter."""
 
     def __init__(self) -> None:
-        super().__init__("world", automatically_declare_parameters_from_overrides=True)
+        begin_node(self, "world")
         try:
             self._read_parameters()
         except CollisionMonitorError:
@@ -77,8 +78,7 @@ class WorldNode(Node):
         self._duration = reader.read(
             "duration", 0.0, "Time after which it stops [s]; 0: at the scene's own end, or never."
         )
-        if not (self._duration >= 0.0 and math.isfinite(self._duration)):
-            raise InputError(f"duration: expected a finite number of seconds, at least 0, got {self._duration}")
+        checked_number(self._duration, "duration", "seconds", least=0.0)
         self._monitor = reader.read("monitor", NODE, "Name of the monitor to publish to.").strip("/")
         self._frame_id = reader.read("frame_id", "world", "Frame of all poses.")
 

@@ -20,6 +20,7 @@ from typing import Any, Final, TypeVar
 
 from collision_monitor.errors import CollisionMonitorError, InputError, UnsupportedError
 from collision_monitor.session.worker import begin_worker
+from collision_monitor.settings.regular_file import FOLDER, NOTHING, found_instead
 
 Result = TypeVar("Result")
 
@@ -50,25 +51,27 @@ def find_sessions(names: Iterable[str]) -> list[Path]:
     """
     found: list[Path] = []
     for name in names:
-        paths = [name] if Path(name).exists() else sorted(glob.glob(name)) or [name]
+        paths = [name] if found_instead(Path(name)) != NOTHING else sorted(glob.glob(name)) or [name]
         for path in map(Path, paths):
-            inside = list(_inside(path)) if path.is_dir() else [path]
+            inside = list(_inside(path)) if found_instead(path) == FOLDER else [path]
             if not inside:
                 raise InputError(f"{path}: expected a folder with .mcap files, got none")
             found += inside
     return list(dict.fromkeys(found))
 
 
-def _inside(folder: Path) -> Iterator[Path]:
-    files = sorted(folder.glob("*.mcap"))
-    parts = [file for file in files if re.fullmatch(re.escape(folder.name) + r"_\d+", file.stem)]
-    if files and ((folder / "metadata.yaml").exists() or parts == files):
-        yield folder
-        return
-    yield from files
-    for below in sorted(folder.iterdir()):
-        if below.is_dir() and not below.is_symlink() and below not in files:  # links may form a cycle
-            yield from _inside(below)
+def _inside(top: Path) -> Iterator[Path]:
+    folders = [top]
+    while folders:
+        folder = folders.pop()
+        files = sorted(folder.glob("*.mcap"))
+        parts = [file for file in files if re.fullmatch(re.escape(folder.name) + r"_\d+", file.stem)]
+        if files and ((folder / "metadata.yaml").exists() or parts == files):
+            yield folder
+            continue
+        yield from files
+        below = [each for each in folder.iterdir() if each.is_dir() and not each.is_symlink()]  # links may form a cycle
+        folders += sorted(set(below) - set(files), reverse=True)
 
 
 def for_each(

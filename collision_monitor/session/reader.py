@@ -33,6 +33,7 @@ from collision_monitor.session.mcap.layout import (
 from collision_monitor.session.mcap.record_reader import McapReader, Message
 from collision_monitor.session.mcap.rosbag2 import INPUT_TYPES, RECORDED_TYPES, full_name
 from collision_monitor.settings.profile import Profile
+from collision_monitor.settings.regular_file import FOLDER, found_instead
 from collision_monitor.settings.yaml_file import read_yaml
 
 _SHORT_NAMES: Final = {full_name(name): name for name in RECORDED_TYPES}
@@ -263,15 +264,14 @@ def _number(text: str | None) -> int:
 
 def _find(path: Path) -> list[Path]:
     """Return the file, or the files of a folder in the order of the numbers in their names. Raises SessionError."""
-    if path.is_dir():
-        files = [file for file in path.glob("*.mcap") if file.is_file()]
+    found = found_instead(path)
+    if found == FOLDER:
+        files = [file for file in path.glob("*.mcap") if not found_instead(file)]
         if not files:
             raise SessionError(f"{path}: expected a folder with .mcap files, got none in it")
         return sorted(files, key=lambda file: [(len(digits), digits) for digits in re.findall(r"\d+|\D+", file.stem)])
-    if not path.is_file():
-        raise SessionError(
-            f"{path}: expected a session file, got {'no regular file' if path.exists() else 'nothing there'}"
-        )
+    if found:
+        raise SessionError(f"{path}: expected a session file, got {found}")
     return [path]
 
 

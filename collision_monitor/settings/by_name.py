@@ -6,6 +6,7 @@ from fnmatch import fnmatchcase
 from functools import lru_cache
 from typing import Final
 
+from collision_monitor.checks.numbers import checked_yaml_number
 from collision_monitor.errors import ProfileError
 
 MOST_CLASSES: Final = 64
@@ -44,8 +45,7 @@ def checked_classes(name: str, text: object, least: float, most: float, unit: st
     if not isinstance(text, str):
         raise ProfileError(f"{name}: expected a text such as 'person*=4, pallet_?=1', got {text!r:.80}")
     for pattern, value in classes_of(name, text):
-        if not least <= value <= most:
-            raise ProfileError(f"{name}, {pattern}: expected {least:g} to {most:g} {unit}, got {value:g}")
+        checked_yaml_number(value, f"{name}, {pattern}", unit, least=least, most=most, error=ProfileError)
     return text
 
 

@@ -20,6 +20,9 @@ BASED_ON: Final = "based_on"
 _PROFILE: Final = "profile"
 """The same in a parameter file of the node, which may serve as a profile: the other parameters are left out."""
 
+_VALUES: Final = 5000
+"""Values in the file of a profile. There are 60 settings, and a running monitor is silent while it reads the file."""
+
 _TOLERANCES: Final = ("position_tolerance", "orientation_tolerance", "velocity_tolerance", "angular_velocity_tolerance")
 
 _EVERYTHING_EXACT: Final[dict[str, Any]] = {
@@ -81,7 +84,7 @@ def profile_changes(name: str) -> dict[str, Any]:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        content = read_yaml(path)
+        content = read_yaml(path, nodes=_VALUES)
     except InputError as error:
         raise ProfileError(f"profile {error}") from None
     if not isinstance(content, dict) or not content:

@@ -6,9 +6,10 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
+from collision_monitor.checks.numbers import checked_yaml_number
 from collision_monitor.errors import InputError
 from collision_monitor.settings.names import nearest_name
-from collision_monitor.settings.yaml_file import Keys, parse_yaml, value_lines
+from collision_monitor.settings.yaml_file import NODES, Keys, parse_yaml, value_lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,9 +22,9 @@ class YamlEntry:
     path: Keys = ()
 
     @classmethod
-    def of_text(cls, text: str, file: str) -> Self:
-        """Parse YAML. file: its name, for errors."""
-        value = parse_yaml(text, file)
+    def of_text(cls, text: str, file: str, nodes: int = NODES) -> Self:
+        """Parse YAML. file: its name, for errors. nodes: most values."""
+        value = parse_yaml(text, file, nodes=nodes)
         return cls(value, file, value_lines(text))
 
     @property
@@ -75,11 +76,7 @@ class YamlEntry:
 
     def number(self, unit: str, least: float = 0.0, most: float = 1e9) -> float:
         """Return a number in a range."""
-        value = self.value
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not (is_number and least <= value <= most):
-            raise self.error(f"a number of {unit} from {least:g} to {most:g}")
-        return float(value)
+        return checked_yaml_number(self.value, self.where, unit, least=least, most=most)
 
     def numbers(self, count: int, unit: str) -> tuple[float, ...]:
         """Return a list of `count` numbers."""

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final
 import yaml
 
 from collision_monitor.errors import InputError
+from collision_monitor.settings.regular_file import read_regular
 
 if TYPE_CHECKING:
     from yaml import SafeLoader
@@ -51,17 +52,9 @@ def read_yaml(path: Path, *, aliases: bool = False, nodes: int = NODES) -> Any:
     return parse_yaml(read_text(path), str(path), aliases=aliases, nodes=nodes)
 
 
-def read_text(path: Path) -> str:
-    """Return the text of a YAML file, of LARGEST bytes at most. Raises InputError."""
-    try:
-        with path.open("rb") as file:
-            data = file.read(LARGEST + 1)
-    except OSError as error:
-        raise InputError(f"{path}: expected a file that can be read, got: {error.strerror}") from None
-    except ValueError as error:  # a path with a NUL
-        raise InputError(f"{str(path)!r}: expected a file that can be read, got: {error}") from None
-    if len(data) > LARGEST:
-        raise InputError(f"{path}: expected YAML of at most {LARGEST} bytes, got more")
+def read_text(path: Path, most: int = LARGEST) -> str:
+    """Return the text of a YAML file. most: bytes. Raises InputError."""
+    data = read_regular(path, "a YAML file", most=most)
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

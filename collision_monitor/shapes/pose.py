@@ -14,6 +14,7 @@ from typing import Any, Final, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from collision_monitor.checks.numbers import real_array, real_number
 from collision_monitor.errors import PoseError
 from collision_monitor.shapes.matrix_to_pose import matrix_to_pose
 from collision_monitor.tolerances import LARGEST_INPUT, NORMALISED, UNIT_QUATERNION
@@ -24,7 +25,7 @@ Array = NDArray[np.float64]
 def checked_vector(value: ArrayLike, name: str, length: int = 3) -> Array:
     """Check a vector of `length` finite numbers; return it as float64, read-only. Raises PoseError."""
     try:
-        result = np.array(value, dtype=np.float64)
+        result = np.array(real_array(value))
     except (TypeError, ValueError, OverflowError):
         raise PoseError(f"{name}: expected {length} numbers, got {value!r}") from None
     if result.shape != (length,):
@@ -40,20 +41,6 @@ def _advice(shape: tuple[int, ...]) -> str:
     matrix = "; of a matrix write Pose.from_matrix(matrix)"
     angles = "; of angles write Pose.from_euler(roll, pitch, yaw)"
     return {(4, 4): matrix, (3, 3): matrix, (3,): angles}.get(shape, "")
-
-
-def unit_quaternion(value: ArrayLike) -> Array:
-    """Normalise a quaternion (x, y, z, w) within 1e-3 of unit length. Raises PoseError beyond."""
-    q = checked_vector(value, "quaternion", 4)
-    norm = float(np.linalg.norm(q))
-    if abs(norm - 1.0) > UNIT_QUATERNION:
-        raise PoseError(
-            f"quaternion: expected x, y, z, w of unit length within {UNIT_QUATERNION:g}, "
-            f"got {q.tolist()} of length {norm:g}"
-        )
-    q = q / norm
-    q.setflags(write=False)
-    return q
 
 
 def multiply(a: ArrayLike, b: ArrayLike) -> Array:
@@ -96,21 +83,15 @@ def _plain(value: Any) -> Any:
     if kind is tuple or kind is list:
         return value
     if kind is np.ndarray:
-        return value.tolist()
+        return real_array(value).tolist()
     raise TypeError
-
-
-def _float(value: Any) -> float:
-    if isinstance(value, str | bytes | bytearray):
-        raise TypeError
-    return float(value)
 
 
 def _three(value: Any) -> tuple[float, float, float]:
     """Return three finite numbers. Raises one of _REFUSED for anything else."""
     x, y, z = _plain(value)
     if not (type(x) is float and type(y) is float and type(z) is float):
-        x, y, z = _float(x), _float(y), _float(z)
+        x, y, z = real_number(x), real_number(y), real_number(z)
     if (
         -LARGEST_INPUT <= x <= LARGEST_INPUT
         and -LARGEST_INPUT <= y <= LARGEST_INPUT
@@ -164,7 +145,7 @@ class Pose(Frozen):
             at = _three(position)
             x, y, z, w = _plain(quaternion)
             if not (type(x) is float and type(y) is float and type(z) is float and type(w) is float):
-                x, y, z, w = _float(x), _float(y), _float(z), _float(w)
+                x, y, z, w = real_number(x), real_number(y), real_number(z), real_number(w)
         except _REFUSED:
             at = tuple(checked_vector(position, "position").tolist())
             x, y, z, w = checked_vector(quaternion, "quaternion", 4).tolist()
@@ -217,7 +198,7 @@ class Pose(Frozen):
         array([1., 2., 3.])
         """
         try:
-            X = np.array(matrix, dtype=np.float64)
+            X = np.array(real_array(matrix), order="C")
         except (TypeError, ValueError, OverflowError):
             raise PoseError(f"matrix: expected numbers (4, 4) or (3, 3), got {matrix!r}") from None
         if X.shape not in ((4, 4), (3, 3)):

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from collision_monitor.checks.numbers import real_array, real_number
 from collision_monitor.errors import ShapeError
 from collision_monitor.tolerances import LARGEST_INPUT
 
@@ -33,7 +34,7 @@ def array_bytes(shape: Shape) -> int:
 def positive(value: float, what: str, *, or_zero: bool = False) -> float:
     """Return a positive number of metres. Raises ShapeError."""
     try:
-        number = float(value)
+        number = real_number(value)
     except (TypeError, ValueError, OverflowError):
         number = nan
     if not (0.0 < number <= LARGEST_INPUT or (or_zero and number == 0.0)):
@@ -54,7 +55,7 @@ def set_positive(shape: Shape, names: Sequence[str]) -> None:
 def full_extents(value: Any, what: str, example: str) -> tuple[float, float, float]:
     """Return three full extents in metres, not all zero. Raises ShapeError."""
     try:
-        x, y, z = map(float, value)
+        x, y, z = map(real_number, value if type(value) in (tuple, list) else real_array(value).tolist())
     except (TypeError, ValueError, OverflowError):
         raise ShapeError(f"{what}: expected 3 full extents in m, as {example}, got {value!r}") from None
     are_valid = 0.0 <= x <= LARGEST_INPUT and 0.0 <= y <= LARGEST_INPUT and 0.0 <= z <= LARGEST_INPUT
@@ -66,7 +67,7 @@ def full_extents(value: Any, what: str, example: str) -> tuple[float, float, flo
 def point_rows(value: ArrayLike, what: str, width: int, least: int) -> Array:
     """Return at least so many points (n, width) in metres, read-only. Raises ShapeError."""
     try:
-        points = np.array(value, dtype=np.float64)
+        points = np.array(real_array(value))
     except (TypeError, ValueError, OverflowError):
         raise ShapeError(f"{what}: expected an array of shape (n, {width}), got {type(value).__name__}") from None
     if points.ndim != 2 or points.shape[1] != width or len(points) < least:

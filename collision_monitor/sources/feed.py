@@ -5,33 +5,46 @@ The same messages in the same order give the same bytes. Time is that of the sta
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator
+from functools import cached_property
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from collision_monitor.codec import Change, encode_descriptions, encode_states
-from collision_monitor.errors import InputError, MessageError
-from collision_monitor.monitor.state.timeline import Order, Progress, Timeline
+from collision_monitor.errors import InputError
+from collision_monitor.monitor.state.timeline import Progress
 from collision_monitor.pipeline.topics import Topic
-from collision_monitor.sources.ground.frames import frame_name
+from collision_monitor.sources.failures import MOST_KEPT_FAILURES, SourceFailure, source_failure
+from collision_monitor.sources.ground.frames import checked_poses, frame_name
 from collision_monitor.sources.ground.mapping import HEADER, Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
+from collision_monitor.sources.ground.silent_topics import SilentTopics
 from collision_monitor.sources.ground.source import RawMessage, Source
 from collision_monitor.sources.ground.source_scene import SourceScene
+from collision_monitor.sources.ground.source_time import MAX_TIME_STEP, MessageStamp, SourceTime
+from collision_monitor.sources.ground.unmonitored import Unmonitored
 from collision_monitor.sources.ground.waiting_states import Step
 from collision_monitor.sources.kinds import BY_TYPE, SECTIONS
+from collision_monitor.sources.messages.marker_arrays import MarkerArrays
 from collision_monitor.sources.messages.static_objects import StandingObjects
-from collision_monitor.sources.messages.tf_objects import TRANSFORMS, FrameSource
+from collision_monitor.sources.messages.tf_objects import FrameSource
+from collision_monitor.sources.messages.transform_arrays import TRANSFORMS, TransformArrays
+from collision_monitor.sources.robot.robot_preparation import RobotPreparation
 from collision_monitor.sources.robot.robot_source import RobotSource
 
-MAX_TIME_STEP: Final = 10.0
-"""s by which a stamp may jump; a larger jump needs a second message, as in the monitor."""
-
-PATIENCE: Final = 0.5
-"""s that a publisher with earlier stamps must go on before its time counts."""
-
 STATIC: Final = "tf_static"
+
+LISTEN_PERIOD: Final = 100_000_000
+"""ns of the clock of receipt between two looks at topics that may have fallen silent."""
+
+MOST_TRANSFORMS: Final = 10_000
+"""Transforms of a message, 0.1 s. A robot sends 100."""
+
+_JUMP: Final = (
+    f"stamp: expected one within {MAX_TIME_STEP:g} s of the others, got one further away: another clock, "
+    "or a jump that the next message confirms"
+)
 
 Decode = Callable[[str, bytes], Any]
 """Decodes a message of a type. Raises MessageError."""
@@ -49,25 +62,36 @@ class Input(NamedTuple):
 class Feed:
     """Converts messages, one by one. scene: what is known, and what was refused. owners: lines of sections by topic.
 
-    least_period: s between two steps at a rate or with a topic. States that arrive in the meantime wait for the next.
-    Call `bind` for each topic when its type is known, `begin` once, and `take` for each message. Raises InputError for
-    a file that cannot be used.
+    allowance: objects that one message may describe anew; None: any number. The others wait for the next message, or
+    for `go_on`. preparation: makes robots that take long; None: they are made at once. Call `bind` for each topic when
+    its type is known, `begin` once, and `take` for each message. Raises InputError for a file that cannot be used.
     """
 
-    def __init__(self, mapping: Mapping, decode: Decode) -> None:
+    def __init__(
+        self,
+        mapping: Mapping,
+        decode: Decode,
+        *,
+        allowance: int | None = None,
+        preparation: RobotPreparation | None = None,
+    ) -> None:
         self.mapping = mapping
-        self.scene = SourceScene(
-            mapping.frame,
-            mapping.max_age,
-            first_free_id=1 + max((entry.object_id for entry in mapping.sources), default=0),
+        self._time = SourceTime(
             by_header=mapping.stamps == HEADER,
+            rate=mapping.rate,
+            step_topic=mapping.step_topic,
+            max_age=mapping.max_age,
         )
+        ids = {entry.object_id for entry in mapping.sources}
+        self.scene = SourceScene(mapping.frame, mapping.max_age, self._time, ids)
+        self.scene.preparation = preparation
         self._decode = decode
-        self._timeline = Timeline()
-        self._last_stamps: dict[str, int] = {}
-        self._tick: int | None = None  # the number of the last step at a rate
-        self._last_step: int | None = None  # its stamp, or that of the last one with a topic
-        self.least_period = 0.0
+        self._allowance = allowance
+        self._failures: list[SourceFailure] = []
+        self._asked: frozenset[str] = frozenset()
+        self._listened = 0
+        stale = [entry.name for entry in mapping.sources if entry.static or entry.shapes]
+        self.silence = SilentTopics(mapping.max_age, stale)
         self._standing = StandingObjects([entry for entry in mapping.sources if entry.static and not entry.topic])
         self._sources: list[Source] = [self._standing]
         self._by_topic: dict[str, list[Source]] = {}
@@ -75,7 +99,16 @@ class Feed:
         for name, content in mapping.sections.items():
             for source in SECTIONS[name](content, mapping):
                 self._add(source, source.topics)
-                self.owners.update(dict.fromkeys(source.topics, getattr(source, "name", name)))
+                self.owners.update(dict.fromkeys(source.topics, source.name))
+
+    @property
+    def least_period(self) -> float:
+        """s between two steps at a rate or with a topic. States that arrive in the meantime wait for the next."""
+        return self._time.least_period
+
+    @least_period.setter
+    def least_period(self, period: float) -> None:
+        self._time.least_period = period
 
     # -- topics
 
@@ -112,6 +145,24 @@ class Feed:
         for topic in topics:
             self._by_topic.setdefault(topic, []).append(source)
 
+    @cached_property
+    def _lines(self) -> dict[str, list[str]]:
+        return {topic: [entry.name for entry in entries] for topic, entries in self.mapping.topics.items()}
+
+    def lines_of(self, topic: str) -> list[str]:
+        """Return the lines of the file that use a topic; the topic itself if the file only implies it."""
+        return self._lines.get(topic) or [self.owners.get(topic, topic)]
+
+    def miss_topic(self, topic: str, reason: str, now_ns: int) -> None:
+        """Note why nothing of a topic is monitored: no publisher, another type. A message ends that."""
+        for line in self.lines_of(topic):
+            self.scene.unmonitored.lacks(line, topic, reason, now_ns)
+
+    @property
+    def unmonitored(self) -> tuple[Unmonitored, ...]:
+        """What the file asks for and is not monitored now, the oldest first."""
+        return self.scene.unmonitored.rows()
+
     @property
     def misplaced(self) -> list[str]:
         """Static objects in frames that tf has not connected with the monitor's so far, with the reason."""
@@ -121,6 +172,11 @@ class Feed:
 
     def begin(self, received: int) -> list[Input]:
         """Return the descriptions of what is known from the start, as a snapshot."""
+        self.scene.received_ns = received
+        wanted = self.wanted
+        self._asked = frozenset(wanted)
+        for topic in wanted:
+            self.miss_topic(topic, f"no message on {topic} yet", received)
         for entry in self.mapping.sources:
             if entry.shapes and not entry.static and entry.marker is None:
                 self.scene.describe(entry.describe())
@@ -133,112 +189,184 @@ class Feed:
         return [self._descriptions(changes, received, snapshot=True)]
 
     def take(self, raw: RawMessage) -> list[Input]:
-        """Return the inputs that a message becomes."""
+        """Return the inputs that a message becomes. Nothing is raised: what is wrong is refused, and counted."""
         try:
             content = self._decode(raw.type, raw.data)
-        except MessageError as error:
-            self.scene.refuse(raw.topic, str(error))
-            return []
-        if raw.type == TRANSFORMS:
-            return list(self._take_transforms(raw, content))
-        return list(self._take(raw, content, self._by_topic.get(raw.topic, [])))
+        except Exception as error:  # refused like what the sources raise
+            content = error
+        return self.take_decoded(raw, content)
 
-    def _take_transforms(self, raw: RawMessage, content: Any) -> Iterator[Input]:
+    def take_decoded(self, raw: RawMessage, content: Any) -> list[Input]:
+        """Return the inputs that a message becomes. content: as decoded, or the exception that the decoder raised."""
+        found: list[Input] = []
+        self._prepare(raw.received)
+        with np.errstate(all="ignore"), self.scene.guard(raw.topic):  # numbers that are none: the monitor refuses them
+            if isinstance(content, Exception):
+                raise content
+            for each in self._inputs(raw, content):
+                found.append(each)
+        if isinstance(content, Exception):
+            self._miss(raw)
+        self._listen(raw.received)
+        self._keep_errors(raw)
+        return found
+
+    def go_on(self, received: int) -> list[Input]:
+        """Return the inputs of what still waits: objects beyond the allowance of the messages before."""
+        found: list[Input] = []
+        self._prepare(received)
+        with np.errstate(all="ignore"), self.scene.guard("sources"):
+            self._settle(self._time.now_or(received))
+            found += self._changes(received)
+        self._listen(received)
+        self._keep_errors(RawMessage("", "", b"", received))
+        return found
+
+    @property
+    def is_behind(self) -> bool:
+        """Whether something waits for `go_on`."""
+        return self.scene.is_behind or (self.scene.preparation is not None and self.scene.preparation.is_busy)
+
+    def take_failures(self) -> list[SourceFailure]:
+        """Return the errors since the last call that nobody expected, with their messages."""
+        failures, self._failures = self._failures, []
+        return failures
+
+    def _prepare(self, received: int) -> None:
+        self.scene.received_ns = received
+        self.scene.allowance = self._allowance
+        self.scene.is_behind = False
+
+    def _keep_errors(self, raw: RawMessage) -> None:
+        for name, error in self.scene.take_errors():
+            if len(self._failures) < MOST_KEPT_FAILURES:
+                self._failures.append(source_failure(name, error, raw))
+
+    def _miss(self, raw: RawMessage) -> None:
+        """List the lines whose message was refused as a whole."""
+        if raw.topic in self._asked:
+            self.miss_topic(raw.topic, self.scene.last_refusal.get(raw.topic, "its message was refused"), raw.received)
+
+    def _listen(self, received: int) -> None:
+        """List the lines whose topics fell silent, at most ten times a second."""
+        if 0 <= received - self._listened < LISTEN_PERIOD:
+            return
+        self._listened = received
+        self.listen(received)
+
+    def listen(self, now_ns: int) -> None:
+        """List the lines whose topics are silent by now."""
+        for each in self.silence.find(now_ns):
+            self.scene.unmonitored.lacks(each.line, each.topic, each.reason, each.last_ns)
+
+    def _inputs(self, raw: RawMessage, content: Any) -> Iterator[Input]:
+        if raw.type == TRANSFORMS:
+            return self._take_transforms(raw, content)
+        return self._take(raw, content, self._by_topic.get(raw.topic, []))
+
+    def _take_transforms(self, raw: RawMessage, content: TransformArrays) -> Iterator[Input]:
         scene, static = self.scene, raw.topic.endswith(STATIC)
-        for each in content.transforms:
-            p, q = each.transform.translation, each.transform.rotation
-            reason = scene.frames.put(
-                frame_name(each.header.frame_id),
-                frame_name(each.child_frame_id),
-                np.array([p.x, p.y, p.z]),
-                np.array([q.x, q.y, q.z, q.w]),
-                scene.stamp_of(each.header, raw.received),
-                static=static,
-            )
-            if reason is not None:
-                scene.refuse(raw.topic, reason)
+        stamps: dict[str, MessageStamp] = {}  # of the frames in this message
+        poses = checked_poses(content.poses[:MOST_TRANSFORMS])
+        if (more := len(content.children) - MOST_TRANSFORMS) > 0:
+            scene.refuse(raw.topic, f"expected at most {MOST_TRANSFORMS} transforms in a message, got more", more)
+        for k, name in enumerate(content.children[:MOST_TRANSFORMS]):
+            with scene.guard(raw.topic, name):
+                child, parent = frame_name(name), frame_name(content.parents[k])
+                stamp = self._time.message_stamp(content.stamps[k], raw.received)
+                if not static and stamp.is_own and not self._takes_transform(child, stamp.ns, raw):
+                    continue
+                reason = scene.frames.put_checked(parent, child, poses[k], stamp.ns, static=static)
+                if reason is None:
+                    stamps[child] = stamp
+                else:
+                    scene.refuse(raw.topic, reason)
         if static:
             self._standing.settle(0, scene)
-        moved: dict[int, list[Source]] = {}
+        moved: dict[tuple[MessageStamp, str], list[Source]] = {}
         for source in self._by_topic.get(raw.topic, ()):
             if not isinstance(source, FrameSource | RobotSource):
                 continue
-            if (header := source.moved_by(content, scene)) is not None:
-                moved.setdefault(scene.stamp_of(header, raw.received), []).append(source)
-        for stamp in sorted(moved):
-            yield from self._step(raw, content, moved[stamp], stamp)
+            frame = source.moved_by(scene)
+            if frame in stamps:
+                moved.setdefault((stamps[frame], frame), []).append(source)
+            elif frame is None:
+                text = f"no moving transform to {source.frame!r}; frames known from tf: {scene.frames.some_names}"
+                scene.unmonitored.explain(source.name, raw.topic, text)
+        for stamp, frame in sorted(moved):
+            yield from self._step(raw, content, moved[stamp, frame], ("/tf", frame), stamp)
         if not moved:
             yield from self._changes(raw.received)
 
-    def _take(self, raw: RawMessage, content: Any, sources: list[Source]) -> Iterator[Input]:
-        header = getattr(content, "header", None)
-        if header is None:  # a MarkerArray
-            header = next((each.header for each in getattr(content, "markers", ())), None)
-        if header is not None:
-            yield from self._step(raw, content, sources, self.scene.stamp_of(header, raw.received))
-            return
-        now = self._timeline.now_ns if self._timeline.has_begun else raw.received
-        for source in sources:  # a message without a stamp, such as a URDF, makes no step
-            source.take(raw.topic, content, now, self.scene)
-        yield from self._changes(raw.received)
-
-    def _step(self, raw: RawMessage, content: Any, sources: list[Source], stamp: int) -> Iterator[Input]:
-        """Give a message to its sources, and yield the inputs that are due with it."""
-        progress = self._advance(raw.topic, stamp)
+    def _takes_transform(self, frame: str, stamp: int, raw: RawMessage) -> bool:
+        """Whether the stamp of a transform can be used; False after a refusal."""
+        progress = self._time.advance_transforms(frame, stamp, raw.received)
         if progress is Progress.RESTARTS:
-            self.scene.restart()
-            self._tick = self._last_step = None
-        elif progress is Progress.REFUSED and self._has_own_steps:
-            self.scene.refuse(
-                raw.topic,
-                f"stamp: expected one within {MAX_TIME_STEP:g} s of the others, got one further away: another clock, "
-                "or a jump that the next message confirms",
-            )
+            self._restart(stamp)
+        elif progress is Progress.REFUSED:
+            self.scene.refuse(raw.topic, f"{frame:.80}: {_JUMP}")
+        return progress is not Progress.REFUSED
+
+    def _take(self, raw: RawMessage, content: Any, sources: list[Source]) -> Iterator[Input]:
+        given = _given_stamp(content)
+        if given is not None:
+            stamp = self._time.message_stamp(given, raw.received)
+            yield from self._step(raw, content, sources, _stream(raw.topic, content), stamp)
             return
-        for source in sources:
-            source.take(raw.topic, content, stamp, self.scene)
-        at = self._step_time(raw.topic, stamp)
+        self._give(raw.topic, content, sources, self._time.now_or(raw.received))
+        yield from self._changes(raw.received)  # a message without a stamp, such as a URDF, makes no step
+
+    def _step(
+        self, raw: RawMessage, content: Any, sources: list[Source], stream: Hashable, stamp: MessageStamp
+    ) -> Iterator[Input]:
+        """Give a message to its sources, and yield the inputs that are due with it."""
+        progress = self._time.advance(stream, stamp, raw.received)
+        if progress is Progress.RESTARTS:
+            self._restart(stamp.ns)
+        elif progress is Progress.REFUSED:
+            self.scene.refuse(raw.topic, _JUMP)
+            self._miss(raw)
+            return
+        self._give(raw.topic, content, sources, stamp.ns)
+        at = self._time.step_due(raw.topic, stamp.ns)
         if at is not None:
-            for source in self._sources:
-                source.settle(at, self.scene)
+            self._settle(at)
         yield from self._changes(raw.received)
         if at is not None:
             yield from (self._states(step, raw.received) for step in self._due(at))
 
-    def _advance(self, topic: str, stamp: int) -> Progress:
-        order = Order.OLD if stamp < self._last_stamps.get(topic, stamp) else Order.IN_ORDER
-        self._last_stamps[topic] = stamp
-        return self._timeline.advance(stamp, order, MAX_TIME_STEP, PATIENCE)
+    def _give(self, topic: str, content: Any, sources: list[Source], stamp: int) -> None:
+        """Let each source take a message. A line that it leaves without anything of use is listed as not monitored."""
+        scene = self.scene
+        for source in sources:
+            name = source.name
+            refused, states = scene.refused_by_name[name], scene.line_states[name]
+            with scene.guard(name):
+                source.take(topic, content, stamp, scene)
+            if source.speaks:
+                self.silence.heard(topic, name, scene.received_ns)
+            if source.speaks and scene.refused_by_name[name] > refused and scene.line_states[name] == states:
+                scene.lacks(name, topic, scene.last_refusal[name])
+            else:
+                scene.has(name, topic)
 
-    # -- steps
+    def _settle(self, at: int) -> None:
+        for source in self._sources:
+            with self.scene.guard(source.name):
+                source.settle(at, self.scene)
 
-    @property
-    def _has_own_steps(self) -> bool:
-        return bool(self.mapping.rate or self.mapping.step_topic)
+    def _restart(self, stamp: int) -> None:
+        """Let everything that holds a stamp begin anew."""
+        self.scene.restart()
+        for source in self._sources:
+            with self.scene.guard(source.name):
+                source.restart(stamp, self.scene)
 
-    def _step_time(self, topic: str, stamp: int) -> int | None:
-        """Return the stamp of the step that is due with a message; None if there is none."""
-        if not self._has_own_steps:
-            return self._timeline.now_ns
-        if self.mapping.step_topic:
-            return stamp if topic == self.mapping.step_topic and not self._is_too_soon(stamp) else None
-        period = round(1e9 / self.mapping.rate)
-        tick = self._timeline.now_ns // period
-        if (self._tick is not None and tick <= self._tick) or self._is_too_soon(tick * period):
-            return None
-        self._tick = tick
-        return tick * period
-
-    def _is_too_soon(self, stamp: int) -> bool:
-        """Whether the least period after the last step is not over. If it is, this step is the last one."""
-        if self._last_step is not None and 0 <= stamp - self._last_step < self.least_period * 1e9:
-            return True
-        self._last_step = stamp
-        return False
+    # -- inputs
 
     def _due(self, at: int) -> Iterator[Step]:
         waiting = self.scene.waiting
-        if not self._has_own_steps:
+        if not self._time.has_own_steps:
             yield from waiting.as_stamped()
             return
         yield waiting.at(at)
@@ -250,7 +378,7 @@ class Feed:
             yield self._descriptions(changes, received)
 
     def _descriptions(self, changes: list[Change], received: int, *, snapshot: bool = False) -> Input:
-        stamp = self._timeline.now_ns if self._timeline.has_begun else 0
+        stamp = self._time.now_ns if self._time.has_begun else 0
         data = encode_descriptions(stamp, self.mapping.frame, changes, snapshot=snapshot)
         return Input(Topic.SHAPES, data, received, received)
 
@@ -258,3 +386,24 @@ class Feed:
         covariance = None if step.covariance is None else step.covariance.ravel()
         data = encode_states(step.stamp_ns, self.mapping.frame, 0, step.states, covariance)
         return Input(Topic.STATES, data, received, step.stamp_ns)
+
+
+def _given_stamp(content: Any) -> int | None:
+    """Return the stamp of a message (ns), 0 if it is left out; None for a message without a header.
+
+    That of markers is the first that is there.
+    """
+    if isinstance(content, MarkerArrays):
+        return next((each for each in content.stamps if each), 0) if content.stamps else None
+    header = getattr(content, "header", None)
+    return None if header is None else int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec)
+
+
+def _stream(topic: str, content: Any) -> Hashable:
+    """Return what has rising stamps: the publishers of a topic have their own frames, joints or markers."""
+    if isinstance(content, MarkerArrays):
+        return topic, content.namespaces[0], content.ids[0]
+    names = getattr(content, "name", None)
+    if isinstance(names, list):  # joint states
+        return topic, names[0] if names else ""
+    return topic, content.header.frame_id

@@ -20,8 +20,10 @@ from collision_monitor.session.recording.recording_state import Recording
 from collision_monitor.settings.profile import Profile
 from collision_monitor.sources.bag import Bag
 from collision_monitor.sources.decoding import Decoder
+from collision_monitor.sources.failures import FailureFiles
 from collision_monitor.sources.feed import STATIC, Feed, Input
 from collision_monitor.sources.ground.mapping import Mapping
+from collision_monitor.sources.ground.unmonitored import Unmonitored
 from collision_monitor.sources.kinds import BY_TYPE
 from collision_monitor.sources.messages.tf_objects import TRANSFORMS
 
@@ -32,7 +34,11 @@ _REPEATED: Final = (Topic.MONITORED_STATES.path, Topic.MONITORED_SHAPES.path)
 
 @dataclass
 class Imported:
-    """Result of an import. states: number of states of each object. skipped, refused: what was left out, by reason."""
+    """Result of an import. states: number of states of each object. skipped, refused: what was left out, by reason.
+
+    unmonitored: what the mapping asks for and was not monitored at the end of the bag. failures: files with the
+    messages of unexpected errors, which are to be reported.
+    """
 
     messages: int = 0
     steps: int = 0
@@ -40,6 +46,8 @@ class Imported:
     skipped: dict[str, int] = field(default_factory=dict)
     refused: dict[str, int] = field(default_factory=dict)
     last_refusal: str = ""
+    unmonitored: list[Unmonitored] = field(default_factory=list)
+    failures: list[str] = field(default_factory=list)
 
     @property
     def unseen(self) -> list[str]:
@@ -80,6 +88,10 @@ def import_bag(
         _write(inputs, target, pipeline, result, overwrite, progress)
     if mapping is not None:
         result.states, result.skipped = dict(feed.scene.states), dict(feed.scene.refused)
+        result.unmonitored = list(feed.unmonitored)
+        files = FailureFiles(target.with_name(f"{target.stem}_failures"))
+        kept = [files.keep(failure) for failure in feed.take_failures()]
+        result.failures = [str(path) for path, is_new in kept if path is not None and is_new]
     return result
 
 
@@ -168,7 +180,9 @@ def _remove(target: Path) -> None:
 
 def _feed_of(bag: Bag, mapping: Mapping) -> Feed:
     """Return a feed that knows the types of the bag's topics. Raises SessionError, InputError."""
-    feed = Feed(mapping, Decoder(bag.definitions))
+    decoder = Decoder({})
+    feed = Feed(mapping, decoder)
+    decoder.use(bag.definitions([*feed.wanted, *_transform_topics(bag)]))
     for topic, types in feed.wanted.items():
         if topic not in bag.topics:
             usable = [f"{name} ({each})" for name, each in sorted(bag.topics.items()) if each in BY_TYPE]
@@ -187,7 +201,7 @@ def _feed_of(bag: Bag, mapping: Mapping) -> Feed:
 
 def _mapped_inputs(bag: Bag, feed: Feed) -> Iterator[Input]:
     """Yield the inputs of the monitor. The static transforms of the whole bag hold from its start."""
-    topics = [topic for topic, kind in bag.topics.items() if kind == TRANSFORMS]
+    topics = _transform_topics(bag)
     static = [topic for topic in topics if topic.endswith(STATIC) and topic not in feed.mapping.topics]
     others = {*feed.wanted, *topics} - set(static)
     begun = False
@@ -199,7 +213,12 @@ def _mapped_inputs(bag: Bag, feed: Feed) -> Iterator[Input]:
             static = []
             _require_placed(feed)
         yield from feed.take(raw)
-    _require_placed(feed)
+    if begun:
+        _require_placed(feed)
+
+
+def _transform_topics(bag: Bag) -> list[str]:
+    return [topic for topic, kind in bag.topics.items() if kind == TRANSFORMS]
 
 
 def _require_placed(feed: Feed) -> None:

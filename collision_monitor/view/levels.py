@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from collision_monitor.records import ContactStatus, Phase, PredictionStatus
 
-Color = tuple[int, int, int]
-
 
 class Level(IntEnum):
     """Level of an object or of a pair. Of several pairs of an object, the highest counts."""

@@ -162,9 +162,7 @@ class Page:
         for key, (_, text, place) in labels.items():
             handle = self._labels.get(key)
             if handle is None:
-                self._labels[key] = self._scene.add_label(
-                    f"/names/{key}", text, position=place, anchor="bottom-center"
-                )
+                self._labels[key] = self._scene.add_label(f"/names/{key}", text, position=place, anchor="bottom-center")
             else:
                 handle.text, handle.position = text, place
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import isfinite
 
 
 @dataclass
@@ -27,5 +28,6 @@ class Player:
             self.time = 0.0
 
     def seek(self, time: float) -> None:
-        """Go to a time (s)."""
-        self.time = min(max(time, 0.0), self.end)
+        """Go to a time (s). One that is no number changes nothing."""
+        if isfinite(time):
+            self.time = min(max(time, 0.0), self.end)

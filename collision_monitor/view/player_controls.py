@@ -74,7 +74,8 @@ class PlayerControls:
         self._player.seek(time)
 
     def _change_speed(self) -> None:
-        self._player.speed = float(self._speed.value.split()[0])
+        if self._speed.value in SPEEDS:
+            self._player.speed = float(self._speed.value.split()[0])
 
     def _go_to_contact(self) -> None:
         chosen = self._places.get(self._contacts.value)

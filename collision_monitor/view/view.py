@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from collision_monitor.view.bodies import Floats
+from collision_monitor.view.frames import RefusalLines
 from collision_monitor.view.moment import Moment
 from collision_monitor.view.page import Page
 from collision_monitor.view.panel import CORNER, WHOLE, Panel, Request, look_at
@@ -38,6 +39,7 @@ class View:
     def __init__(self, server: viser.ViserServer) -> None:
         self._server = server
         self.requests: SimpleQueue[Request] = SimpleQueue()
+        self._lines = RefusalLines()
         self._page = Page(server, on_pick=lambda object_id: self.requests.put(lambda: self._select(object_id)))
         self.panel = Panel(server, self.requests, self._page.hidden)
         self._selected: int | None = None
@@ -60,7 +62,11 @@ class View:
     def answer_requests(self) -> None:
         """Do what users asked for since the last call."""
         while not self.requests.empty():
-            self.requests.get()()
+            request = self.requests.get()
+            try:
+                request()
+            except Exception as error:  # a browser sent a value that no control of the page has
+                self._lines.add(f"what a browser asked for: {error!r:.200}")
             self.is_outdated = True
 
     def show(self, moment: Moment, title: str, notes: list[str]) -> Picture:

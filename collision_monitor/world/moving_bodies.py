@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.qhull import qhull
+from collision_monitor.settings.regular_file import open_regular
 from collision_monitor.shapes.pose import from_rotation_vector, multiply
 from collision_monitor.shapes.registry import Box, Capsule, ConvexHull, Cylinder, Shape, Sphere
 
@@ -35,6 +36,8 @@ MAX_RATE: Final = 1.0
 """Largest component of velocity (m/s) and angular velocity (rad/s)."""
 MEAN_OVERLAPS: Final = 0.5
 """Mean number of bodies that a body overlaps."""
+LARGEST_SCENE: Final = 1 << 30
+"""Bytes of the file of a scene: a million bodies."""
 HULLS: Final = 64
 HULL_POINTS: Final = 32
 
@@ -134,7 +137,7 @@ def make_moving_bodies(name: str, n: int, seed: int = 1, frames: int = FRAMES) -
 def load_moving_bodies(path: Path) -> MovingBodies:
     """Load a saved scene. Raises InputError if the file is not one."""
     try:
-        with np.load(path) as file:
+        with open_regular(path, "a scene", most=LARGEST_SCENE) as stream, np.load(stream) as file:
             arrays = {key: file[key] for key in file.files}
         return _from_arrays(**arrays)
     except (OSError, KeyError, TypeError, ValueError, IndexError, zipfile.BadZipFile) as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterator
 from dataclasses import dataclass
+from io import TextIOWrapper
 from math import isfinite
 from pathlib import Path
 
@@ -12,6 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import InputError
+from collision_monitor.settings.regular_file import open_regular
+
+LARGEST_TRACKS = 64 << 20
+"""Bytes of a file: about a million rows, which take ten times that memory."""
 
 _LARGEST = 2**31 - 1
 
@@ -32,10 +37,13 @@ class TrackFile:
 def read_track_file(path: Path, columns: tuple[str, ...]) -> TrackFile:
     """Read the columns `id`, `frame` and `columns` of a CSV file. Raises InputError if the file is not valid."""
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            return _parse(path, csv.reader(file), columns)
+        with (
+            open_regular(path, "a CSV file", most=LARGEST_TRACKS) as file,
+            TextIOWrapper(file, "utf-8-sig", newline="") as text,
+        ):
+            return _parse(path, csv.reader(text), columns)
     except OSError as error:
-        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+        raise InputError(f"{path}: expected a CSV file, got {error.strerror}") from None
     except UnicodeDecodeError:
         raise InputError(f"{path}: expected a CSV text file in UTF-8, got other bytes") from None
     except csv.Error as error:

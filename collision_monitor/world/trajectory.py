@@ -18,6 +18,7 @@ import numpy as np
 from collision_monitor.errors import InputError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
+from collision_monitor.settings.regular_file import FOLDER, NOTHING, found_instead
 from collision_monitor.shapes.pose import from_rotation_vector, multiply
 from collision_monitor.shapes.registry import Box, Cylinder, Shape
 from collision_monitor.world.scene import TIME_ROUND_OFF, Scene, States, positive_rate, state_array
@@ -105,7 +106,7 @@ class Trajectory(Scene):
 
 def clip_paths(path: Path) -> list[Path]:
     """Paths of the clips at `path`, one for each clip. Raises InputError if there are none."""
-    return [path] if path.is_file() else [_prefix(clip[0]) for clip in _find_clips(path)]
+    return [path] if not found_instead(path) else [_prefix(clip[0]) for clip in _find_clips(path)]
 
 
 def track_files(path: Path | None) -> list[Path]:
@@ -142,17 +143,20 @@ def _find_clips(path: Path | None) -> list[list[Path]]:
     give = f"a clip's prefix (clip for clip{_PEOPLE} and clip{_CARTS}), one of these files, or a folder of them"
     if path is None:
         raise InputError(f"path: the scene 'trajectory' plays recorded tracks; give {give}")
-    if path.is_file():
+    found = found_instead(path)
+    if not found:
         if not path.name.endswith((_PEOPLE, _CARTS)):
             raise InputError(f"path: expected a file named *{_PEOPLE} or *{_CARTS}, got {path}")
         return [[path]]
-    if path.is_dir():
+    if found == FOLDER:
         files = [file for ending in (_PEOPLE, _CARTS) for file in sorted(path.glob(f"*{ending}"))]
         prefixes = sorted({_prefix(file).name for file in files})
         clips = [[f for f in files if f.name in (prefix + _PEOPLE, prefix + _CARTS)] for prefix in prefixes]
+    elif found != NOTHING:
+        raise InputError(f"path: expected {give}, got {found}: {path}")
     else:
         files = [path.with_name(path.name + ending) for ending in (_PEOPLE, _CARTS)]
-        clips = [[file for file in files if file.is_file()]]
+        clips = [[file for file in files if not found_instead(file)]]
     if not any(clips):
         raise InputError(f"path: found no tracks at {path}; expected {give}")
     return clips

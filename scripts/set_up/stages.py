@@ -311,8 +311,8 @@ STAGES = (
     Stage("tools", "installing tools for the tests", _tools_inputs, _install_tools, _PIP, False),
 )
 
-MODULES = ("scipy", "numba", "trimesh", "collada", "mcap", "rich", "matplotlib", "yaml", "rosbags", "colcon_core")
-TOOL_MODULES = ("fcl", "pytest", "hypothesis", "mypy", "viser")
+MODULES = ("scipy", "numba", "mcap", "rich", "matplotlib", "yaml", "rosbags", "colcon_core")
+TOOL_MODULES = ("fcl", "pytest", "hypothesis", "mypy", "viser", "trimesh", "collada")
 
 _HEALTH = """
 import importlib.util, sys

@@ -123,5 +123,5 @@ def test_the_parameter_is_a_path_or_the_yaml_itself(tmp_path: Path) -> None:
     (tmp_path / "r.yaml").write_text(text)
     assert Rules.given(str(tmp_path / "r.yaml")).rules == Rules.given(text).rules
     assert not Rules.given("").rules
-    with pytest.raises(InputError, match="expected a file that can be read"):
+    with pytest.raises(InputError, match="expected a YAML file, got nothing there"):
         Rules.given(str(tmp_path / "missing.yaml"))

@@ -1,8 +1,9 @@
-"""Attack the pipeline with hostile messages, in this process or a node over DDS.
+"""Attack the pipeline with hostile messages, in this process or a node over DDS; or the sources with those of others.
 
     make fuzz                                           # 100,000 messages
     make fuzz ARGS="--messages 1000000 --seed 7"
     make fuzz ARGS="--dds --messages 20000"             # a node in its own process, on a ROS domain of its own
+    make fuzz ARGS="--sources --messages 1000000"       # messages of other programs, of all types of docs/sources.md
     make fuzz ARGS="--reproduce attack_7_123.json"
 
 Each run of 5,000 messages has its own seed and pipeline, so that a failure is reproduced in seconds. Between the
@@ -17,7 +18,8 @@ import base64
 import json
 import sys
 import time
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 from os import cpu_count
@@ -25,7 +27,7 @@ from pathlib import Path
 from typing import Any, Final
 
 HERE: Final = Path(__file__).parent
-sys.path[:0] = [str(HERE), str(HERE.parents[1])]
+sys.path[:0] = [str(HERE), str(HERE.parent / "helpers"), str(HERE.parents[1])]
 
 from campaign import RUN, Campaign, Failure, Summary, is_broken_by, resident  # noqa: E402
 from rich.console import Console  # noqa: E402
@@ -51,16 +53,16 @@ def runs(seed: int, messages: int) -> list[tuple[int, int]]:
     return [(seed + k, RUN) for k in range(whole)] + ([(seed + whole, rest)] if rest else [])
 
 
-def summaries(args: argparse.Namespace) -> Iterator[tuple[Summary, int]]:
-    """Run all campaigns on several processes."""
+def results(args: argparse.Namespace, run_one: Callable[[int, int], Any]) -> Iterator[Any]:
+    """Run all campaigns on several processes, each by `run_one` with its seed and number of messages."""
     wanted = runs(args.seed, args.messages)
     jobs = args.jobs
     if jobs == 1 or len(wanted) == 1:
         for each in wanted:
-            yield run(*each)
+            yield run_one(*each)
         return
     with ProcessPoolExecutor(jobs, get_context("spawn")) as processes:
-        futures = [processes.submit(run, *each) for each in wanted]
+        futures = [processes.submit(run_one, *each) for each in wanted]
         try:
             for future in as_completed(futures):
                 yield future.result()
@@ -70,13 +72,28 @@ def summaries(args: argparse.Namespace) -> Iterator[tuple[Summary, int]]:
 
 def reproduce(path: Path) -> list[str]:
     """Return what a saved input breaks: first alone, and if it then breaks nothing, behind all inputs before it."""
-    failure = Failure(**json.loads(path.read_text()))
-    if failure.topic:
+    content = json.loads(path.read_text())
+    if "line" in content:  # that a node or an import kept
+        return reproduce_source(path)
+    failure = Failure(**content)
+    if failure.topic in Topic.__members__:
         problems = is_broken_by(Topic[failure.topic], base64.b64decode(failure.data))
         if problems:
             return problems
-    summary = Campaign(failure.seed).run(failure.index + 1)
+    if failure.topic.startswith("/"):
+        summary = run_sources(failure.seed, failure.index + 1)
+    else:
+        summary = Campaign(failure.seed).run(failure.index + 1)
     return [each.problem for each in summary.failures]
+
+
+def reproduce_source(path: Path) -> list[str]:
+    """Return what a message breaks that a node kept for a report, in sources of all types."""
+    from source_campaign import broken_by
+
+    from collision_monitor.sources.failures import read_failure
+
+    return broken_by(read_failure(path))
 
 
 def in_process(args: argparse.Namespace) -> dict[str, Any]:
@@ -90,7 +107,7 @@ def in_process(args: argparse.Namespace) -> dict[str, Any]:
     columns = ("attacks", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("", total=args.messages)
-        for summary, memory in summaries(args):
+        for summary, memory in results(args, run):
             bar.update(task, advance=summary.messages)
             totals["messages"] += summary.messages
             totals["steps"] += summary.steps
@@ -113,6 +130,44 @@ def in_process(args: argparse.Namespace) -> dict[str, Any]:
     return {**totals, "digests": dict(sorted(digests.items()))}
 
 
+def run_sources(seed: int, messages: int) -> Any:
+    """Run one campaign against the sources. Return its summary."""
+    from source_campaign import SourceCampaign
+
+    return SourceCampaign(seed).run(messages)
+
+
+def against_sources(args: argparse.Namespace) -> dict[str, Any]:
+    """Attack the sources. Return the totals."""
+    began = time.monotonic()
+    totals: dict[str, Any] = {"messages": 0, "known objects": 0, "states": 0, "descriptions": 0, "refused": 0}
+    by_topic: Counter[str] = Counter()
+    slowest: dict[str, float] = {}
+    failures: list[Failure] = []
+    console = Console(stderr=True)
+    columns = ("attacks on the sources", BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task("", total=args.messages)
+        for summary in results(args, run_sources):
+            bar.update(task, advance=summary.messages)
+            for name, value in zip(totals, (summary.messages, summary.known, summary.states), strict=False):
+                totals[name] += value
+            totals["descriptions"] += summary.descriptions
+            totals["refused"] += summary.refused
+            by_topic += summary.by_topic
+            for topic, took in summary.slowest.items():
+                slowest[topic] = max(slowest.get(topic, 0.0), took)
+            failures += summary.failures
+            if len(failures) >= args.failures:
+                break
+    worst = sorted(slowest.items(), key=lambda each: -each[1])
+    totals["slowest"] = ", ".join(f"{topic} {1e3 * took:.0f} ms" for topic, took in worst[:5])
+    totals["seconds"] = round(time.monotonic() - began, 1)
+    totals["failures"] = [str(each.save(args.folder)) for each in failures]
+    totals["problems"] = [each.problem for each in failures]
+    return {**totals, "by topic": dict(sorted(by_topic.items()))}
+
+
 def over_dds(args: argparse.Namespace) -> dict[str, Any]:
     """Attack a node in its own process."""
     from dds_campaign import attack_node  # imports rclpy
@@ -133,6 +188,7 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--failures", type=int, default=5, help="end after so many")
     parser.add_argument("--folder", type=Path, default=Path("build/fuzz"), help="for the inputs of failures")
     parser.add_argument("--reproduce", type=Path, metavar="FILE", help="send a saved input again")
+    parser.add_argument("--sources", action="store_true", help="attack the sources with messages of other programs")
     parser.add_argument("--dds", action="store_true", help="attack a node in its own process, over DDS")
     parser.add_argument("--rate", type=float, default=500.0, help="messages per second over DDS")
     parser.add_argument("--json", action="store_true", help="print one JSON object")
@@ -141,12 +197,13 @@ def main(arguments: list[str] | None = None) -> int:
         problems = reproduce(args.reproduce)
         print("\n".join(problems) or "it breaks nothing any more")
         return FAILED if problems else 0
-    totals = over_dds(args) if args.dds else in_process(args)
+    attack = against_sources if args.sources else over_dds if args.dds else in_process
+    totals = attack(args)
     if args.json:
         print(json.dumps(totals))
     else:
         for name, value in totals.items():
-            if name != "digests":
+            if name not in ("digests", "by topic"):
                 print(f"{name:15} {value:,}" if isinstance(value, int) else f"{name:15} {value}")
     return FAILED if totals["failures"] else 0
 

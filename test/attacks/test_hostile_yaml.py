@@ -39,7 +39,7 @@ HOSTILE: dict[str, tuple[bytes, str]] = {
     "block tables": (b"".join(b" " * k + b"a:\n" for k in range(1000)), f"line {DEEPEST + 1}"),
     "keys of keys": (b"? " * 100_000, "deeper nesting"),
     "10 MB": (b"a" * 10_000_000, f"at most {LARGEST} bytes"),
-    "many values": (b"[" + b"1," * (LARGEST // 2 - 2) + b"]", f"at most {NODES}"),
+    "many values": (b"[" + b"1," * (LARGEST // 2 - 2) + b"]", "more values (at most "),
     "binary": (bytes(range(256)) * 100, "UTF-8"),
     "UTF-16": ("a: 1".encode("utf-16"), "UTF-8"),
     "NUL": (b"a: \0", "expected YAML"),

@@ -6,12 +6,17 @@ from point_sets import rotation
 from solids import cube, octahedron, u_shape
 
 from collision_monitor.errors import InputError
-from collision_monitor.geometry.contact_features import FeaturePair, FeatureType, classify_contact, mesh_feature_at
+from collision_monitor.geometry.contact_features import FeatureContact, FeaturePair, FeatureType, mesh_feature_at
 
 UP = [0, 0, 1]
 R2 = 2**-0.5
 ON_EDGE = np.array([[1, 0, 0], [0, R2, -R2], [0, R2, R2]])  # 45 degrees about x, so that a cube stands on an edge
 ON_CORNER = np.linalg.qr(np.array([[1, 1, 1], [1, 0, 0], [0, 1, 0.0]]).T)[0].T[[1, 2, 0]]
+
+
+def features_at(point, a, faces_a, b, faces_b, normal):
+    normal = np.asarray(normal, float)
+    return FeatureContact(mesh_feature_at(point, normal, a, faces_a), mesh_feature_at(point, -normal, b, faces_b))
 
 
 def lowest(turn):
@@ -45,11 +50,11 @@ CASES = {
 def test_the_six_pairs(name, scale, seed):
     turn, shift = rotation(seed) * scale, np.array([1, 2, 3]) * scale
     (a, faces_a), (b, faces_b) = ((vertices @ turn.T + shift, faces) for vertices, faces in CASES[name])
-    found = classify_contact(shift, a, faces_a, shift, b, faces_b, turn @ UP / scale)
+    found = features_at(shift, a, faces_a, b, faces_b, turn @ UP / scale)
     assert found.pair is FeaturePair[name]
     letters = "".join(feature.type.name[0] for feature in (found.a, found.b))
     assert letters == name
-    swapped = classify_contact(shift, b, faces_b, shift, a, faces_a, -turn @ UP / scale)
+    swapped = features_at(shift, b, faces_b, a, faces_a, -turn @ UP / scale)
     assert swapped.pair is FeaturePair[name] and (swapped.a, swapped.b) == (found.b, found.a)
     # the named feature contains the contact point
     for feature, points in ((found.a, a), (found.b, b)):
@@ -61,7 +66,7 @@ def test_in_words():
     vertices, faces = cube()
     point = vertices[3] * 1.0
     above = vertices + point - vertices[0]
-    found = classify_contact(point, vertices, faces, point, *octahedron_on(point), [0, 0, 1])
+    found = features_at(point, vertices, faces, *octahedron_on(point), [0, 0, 1])
     assert str(found.b) == "vertex 5" and found.a.type is FeatureType.FACE
     assert str(found).startswith("face ") and str(found).endswith("of A on vertex 5 of B")
     edge = mesh_feature_at([0.5, 0, 0], [0, -1, -1], vertices, faces)

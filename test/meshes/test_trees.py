@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 import collision_monitor as cm
 from collision_monitor.geometry.polyhedra import edge_face, locate_in_polyhedron
 from collision_monitor.meshes.distance.nearest import MEMORY, PAIRS, PLACE_A, PLACE_B, answer_row, tree_distance
-from collision_monitor.meshes.extent import extents
+from collision_monitor.meshes.extent import tree_extents
 from collision_monitor.meshes.layout import AXES, CENTER, CHILD, FACE, HALF, WIDTH
 from collision_monitor.meshes.overlap.touching_triangles import trees_touch
 from collision_monitor.meshes.trees import tree
@@ -184,7 +184,7 @@ def test_the_reach_of_a_tree_is_that_of_its_corners():
     directions /= np.linalg.norm(directions, axis=1)[:, None]
     for corners in SURFACES.values():
         expected = (corners.reshape(-1, 3) @ directions.T).max(axis=0) + 0.2
-        assert extents(tree_of(corners, 0.2), directions) == pytest.approx(expected, abs=1e-14)
+        assert tree_extents(tree_of(corners, 0.2), directions) == pytest.approx(expected, abs=1e-14)
 
 
 def test_a_point_is_inside_a_closed_surface_where_the_exact_test_says_so():

@@ -98,9 +98,9 @@ def test_addresses_of_meshes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     ("text", "reason"),
     [
         ('<mesh filename="package://nowhere/part.stl"/>', "in the package 'nowhere', got none (searched: no folder)"),
-        ('<mesh filename="part.stl"/>', "part.stl, got none there"),
+        ('<mesh filename="part.stl"/>', "part.stl', got nothing there"),
         ('<mesh filename="https://example.com/part.stl"/>', "expected a path, file:// or package://, got 'https:"),
-        ('<mesh filename="r.stl"/>', "r.stl: expected at least one face, got none"),
+        ('<mesh filename="r.stl"/>', "r.stl: expected a mesh in STL format: expected the 84 bytes of a head"),
         ("<mesh/>", "expected an attribute filename, got no attribute"),
         ('<mesh filename="part.obj" scale="1 0 1"/>', "expected a scale without zeros, got [1.0, 0.0, 1.0]"),
         ('<box size="1 -2 3"/>', "Box size: expected 3 extents"),
@@ -121,7 +121,7 @@ def test_a_geometry_that_cannot_be_used_is_named_and_the_others_stay(tmp_path: P
 
 
 def test_a_file_that_is_missing_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"arm.urdf: expected a file that can be read, got: No such file"):
+    with pytest.raises(InputError, match=r"arm.urdf: expected a file that can be read, got nothing there"):
         Description.read(tmp_path / "arm.urdf")
 
 

@@ -13,7 +13,7 @@ from collision_monitor.errors import InputError
 from collision_monitor.robots.kinematic_tree import kinematic_tree
 from collision_monitor.robots.srdf import disabled_pairs
 from collision_monitor.robots.urdf import JointType, parse_urdf
-from collision_monitor.robots.xml_tree import DEEPEST
+from collision_monitor.settings.xml_tree import DEEPEST
 
 ARM = Path(__file__).parents[2] / "examples/arm/arm.urdf"
 

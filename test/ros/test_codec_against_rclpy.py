@@ -109,6 +109,27 @@ def test_predictions(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+def test_alerts(seed: int) -> None:
+    message = random_message(msg.CollisionAlertArray, np.random.default_rng(seed))
+    it = codec.decode_alerts(serialize_message(message))
+    assert (it.stamp_ns, it.frame_id, it.step) == (stamp(message), message.header.frame_id, message.step)
+    assert (it.number, it.highest, it.monitor) == (message.number, message.highest, message.monitor)
+    for ours, theirs in zip(it.alerts, message.alerts, strict=True):
+        assert codec.encode_alert(ours) == codec.encode_alert(codec.decode_alert(serialize_message(theirs)))
+        names = [name for name in theirs.get_fields_and_field_types() if name not in ("header", "since")]
+        assert [flat(getattr(ours, name)) for name in names] == [flat(getattr(theirs, name)) for name in names]
+    assert [flat_record(each) for each in it.held_back] == [flat(each) for each in message.held_back]
+    assert list(it.rule_names) == message.rule_names
+    for ours, theirs in zip(it.coverage, message.coverage, strict=True):
+        assert flat(list(vars(ours).values())) == flat(theirs)
+    for ours, theirs in zip(it.unmonitored, message.unmonitored, strict=True):
+        expected = theirs.name, theirs.reason, theirs.since.sec * 10**9 + theirs.since.nanosec, theirs.is_silent
+        assert (ours.name, ours.reason, ours.since_ns, ours.is_silent) == expected
+        assert list(ours.coverage) == list(theirs.coverage)
+    assert deserialize_message(codec.encode_alerts(it), msg.CollisionAlertArray) == message
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_status(seed: int) -> None:
     message = random_message(msg.MonitorStatus, np.random.default_rng(seed))
     data = serialize_message(message)

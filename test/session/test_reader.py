@@ -8,12 +8,14 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 from session_scene import CONTACTS, NODE, SHAPES, STATES, STATUS, TYPES, inputs, record
 
 from collision_monitor.errors import SessionError
 from collision_monitor.session import Session
+from collision_monitor.session.mcap.layout import HEAD, MAGIC
 
 
 def test_a_finished_session_reads_as_it_was_written(recorded: Path) -> None:
@@ -187,3 +189,41 @@ def test_a_session_of_a_process_that_died_reads_as_far_as_it_goes(tmp_path: Path
     assert CONTACTS in {m.topic for m in messages}
     assert {m.topic for m in messages} <= set(TYPES)
     recorder.close()
+
+
+def test_a_chunk_that_was_taken_out_is_noticed_by_the_summary(tmp_path: Path) -> None:
+    """Nothing else shows it in a file whose messages have no numbers of ours."""
+    path = tmp_path / "a.mcap"
+    with path.open("wb") as stream:
+        writer = Writer(stream, chunk_size=1)
+        writer.start("ros2", "another recorder")
+        schema = writer.register_schema("collision_monitor_msgs/msg/ObjectStateArray", "ros2msg", b"")
+        channel = writer.register_channel("/m/objects/states", "cdr", schema)
+        for k, (topic, data) in enumerate(inputs(10)):
+            if topic == STATES:
+                writer.add_message(channel, k, data, k, 0)
+        writer.finish()
+    whole = path.read_bytes()
+    session = Session(path)
+    count = len(list(session.messages()))
+    assert session.damage == []
+    begin, end = chunk_spans(whole)[3]
+    summary = int.from_bytes(whole[-28:-20], "little") - (end - begin)
+    path.write_bytes(whole[:begin] + whole[end:-28] + summary.to_bytes(8, "little") + whole[-20:])
+    session = Session(path)
+    assert len(list(session.messages())) == count - 1
+    assert session.damage == [f"its summary states {count} messages, there are {count - 1}"]
+
+
+def chunk_spans(data: bytes) -> list[tuple[int, int]]:
+    """Begin and end of each chunk of a file."""
+    found = []
+    at = len(MAGIC)
+    while at + HEAD.size <= len(data):
+        opcode, length = HEAD.unpack_from(data, at)
+        if opcode == Opcode.CHUNK:
+            found.append((at, at + HEAD.size + length))
+        at += HEAD.size + length
+        if opcode == Opcode.FOOTER:
+            return found
+    return found

@@ -39,12 +39,22 @@ def test_every_public_name_resolves(name: str) -> None:
         found = getattr(found, part)
 
 
-MODULES = sorted(set(re.findall(r"`((?:geometry|monitor|broad_phase|detection)\.\w+)`", METHODS)))
+MODULES = sorted(set(re.findall(r"`((?:geometry|monitor|broad_phase|detection)\.[\w.]+)`", METHODS)))
 
 
 @pytest.mark.parametrize("name", MODULES)
 def test_every_module_imports(name: str) -> None:
     assert import_module(f"collision_monitor.{name}")
+
+
+@pytest.mark.parametrize(("name", "functions"), re.findall(r"`([\w.]+)` \(((?:`\w+`(?:, )?)+)\)", METHODS))
+def test_every_function_that_is_listed_behind_a_module_is_there(name: str, functions: str) -> None:
+    for function in re.findall(r"\w+", functions):
+        assert callable(getattr(import_module(f"collision_monitor.{name}"), function))
+
+
+def test_functions_are_listed_behind_modules() -> None:
+    assert len(re.findall(r"` \(`", METHODS)) >= 5
 
 
 @pytest.mark.parametrize("path", sorted(set(re.findall(r"`(test/\S+\.py)`", METHODS))))

@@ -465,7 +465,7 @@ def test_a_scan_is_one_object_without_the_points_on_the_robot_that_carries_the_s
     assert any("the pose of robot is not known" in text for text in fed.refused)
     fed.give("/odom", at(1), odometry("map", at(1), (3 - 0.05, 0, 0), (0, 0, 0, 1), (1, 0, 0), (0, 0, 0)))
     fed.give("/scan", at(2), point_cloud("map", at(2), np.add(ahead, (3, 0, 0))))  # 0.05 s and 0.05 m later
-    (cloud, _), = fed.changes[-1].shapes  # type: ignore[union-attr]
+    ((cloud, _),) = fed.changes[-1].shapes  # type: ignore[union-attr]
     np.testing.assert_allclose(cloud.points[:, 0], [5, 3.7], atol=1e-6)
     assert cloud.radius == 0.02 and fed.feed.scene.points_dropped["scan"] == 2
     fed.give("/scan", at(3), point_cloud("map", at(3), [(3.1, 0, 0)]))
@@ -475,7 +475,7 @@ def test_a_scan_is_one_object_without_the_points_on_the_robot_that_carries_the_s
     assert "scan, without: 'robto' is unknown: did you mean 'robot'" in problem
     fed = Fed({"scan": {"topic": "/scan"}})
     fed.give("/scan", at(0), laser_scan("map", at(0), [1, np.inf, np.nan, 2]))
-    (cloud, _), = fed.changes[-1].shapes  # type: ignore[union-attr]
+    ((cloud, _),) = fed.changes[-1].shapes  # type: ignore[union-attr]
     assert len(cloud.points) == 2 and fed.feed.scene.points_dropped["scan"] == 1
 
 

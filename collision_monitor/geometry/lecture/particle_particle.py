@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from collision_monitor.geometry.coordinates import Array, Booleans, checked_numbers, coordinates
+from collision_monitor.checks.numbers import checked_array
+from collision_monitor.geometry.coordinates import Array, Booleans, coordinates
 from collision_monitor.geometry.lecture.closest_points import closest_points
 from collision_monitor.geometry.lines import LineKind
 from collision_monitor.tolerances import EPSILON
@@ -50,8 +51,8 @@ def particle_particle(
     time, distance = closest_approach(p_a, v_a, p_b, v_b)
     at_once = distance <= nearest.distance + ROUND_OFF * np.linalg.norm(offset, axis=-1)
     alpha, beta = np.where(at_once, time, nearest.alpha), np.where(at_once, time, nearest.beta)
-    near = nearest.distance <= checked_numbers(distance_threshold, "distance_threshold", 0.0)
-    together = np.abs(alpha - beta) <= checked_numbers(time_threshold, "time_threshold", 0.0)
+    near = nearest.distance <= checked_array(distance_threshold, "distance_threshold", least=0.0)
+    together = np.abs(alpha - beta) <= checked_array(time_threshold, "time_threshold", least=0.0)
     return ParticleEncounter(np.asarray(near & together), nearest.distance, alpha, beta)
 
 

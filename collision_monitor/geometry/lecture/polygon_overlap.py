@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import Enum
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,10 @@ from collision_monitor.geometry.lines import segments_intersect
 from collision_monitor.geometry.orientation import orient2d
 from collision_monitor.geometry.point_in_polygon import Location, locate_in_polygon
 from collision_monitor.geometry.polygons import is_convex, is_counter_clockwise, polygon_corners
+from collision_monitor.tolerances import EPSILON
+
+PARALLEL: Final = 16 * EPSILON
+"""Angle (rad) up to which two edges of a polygon share an axis. It decides what is counted, and no answer."""
 
 
 class Evidence(Enum):
@@ -62,7 +66,7 @@ class SatResult(NamedTuple):
     overlaps: touching counts. axis (2,): unit, from A to B; if they overlap, the axis of the minimum translation.
     distance (m): if they overlap, negative, and moving B by -distance * axis makes them touch; else the gap along
     the axis, which is at most their distance. edge: index of the axis' edge, B's edges counted after those of A; a
-    hint for the next call. tested: number of axes tested.
+    hint for the next call. tested: number of axes tested, of which parallel edges of a polygon share one.
     """
 
     overlaps: bool
@@ -81,27 +85,46 @@ def project(points: ArrayLike, axis: ArrayLike) -> tuple[Array, Array]:
 def sat_2d(a: ArrayLike, b: ArrayLike, hint: int = 0) -> SatResult:
     """Separating axis test of convex polygons (n, 2) of either orientation; ends at the first separating axis.
 
-    (Slides "Separating Axis Theorem (SAT) - in 2D".) The axes are the outward edge normals. A polygon's own projection
-    ends at its edge, so the gap is that of the other polygon's nearest corner; whether there is a gap is decided by
-    cross products, exactly. `hint`: the edge to try first, such as that of the last call. Raises ShapeError for concave
+    (Slides "Separating Axis Theorem (SAT) - in 2D".) The axes are the edge normals, two for a square: parallel edges of
+    a polygon share one, on which both sides are tested. A polygon's own projection ends at its edge, so the gap is that
+    of the other polygon's nearest corner; whether there is a gap is decided by cross products, exactly. `hint`: the
+    edge to try first, such as that of the last call. Raises ShapeError for concave
     polygons.
     """
     first, second = _counter_clockwise(a), _counter_clockwise(b)
     # relative to a corner, because far from the origin the dot products would cancel
     best, best_edge, axis = -np.inf, -1, np.zeros(2)
     count = len(first) + len(second)
-    for tested, edge in enumerate([hint % count, *(k for k in range(count) if k != hint % count)], start=1):
-        own, other, k = (first, second, edge) if edge < len(first) else (second, first, edge - len(first))
-        start, end = own[k], own[(k + 1) % len(own)]
-        along = end - start
-        normal = np.array([along[1], -along[0]]) / np.hypot(*along)
-        gap = float(((other - start) @ normal).min())
-        separates = bool((np.asarray(orient2d(start, end, other)) < 0.0).all())
-        if gap > best or separates:
-            best, best_edge, axis = gap, edge, normal if own is first else -normal
-        if separates:
-            return SatResult(False, axis, max(gap, 5e-324), edge, tested)
-    return SatResult(True, axis, min(best, 0.0), best_edge, count)
+    axes = [*_axes(first), *([k + len(first) for k in edges] for edges in _axes(second))]
+    axes.sort(key=lambda edges: hint % count not in edges)  # that of the hint comes first, the others stay in order
+    for tested, edges in enumerate(axes, start=1):
+        for edge in sorted(edges, key=lambda k: k != hint % count):
+            own, other, k = (first, second, edge) if edge < len(first) else (second, first, edge - len(first))
+            start, end = own[k], own[(k + 1) % len(own)]
+            along = end - start
+            normal = np.array([along[1], -along[0]]) / np.hypot(*along)
+            gap = float(((other - start) @ normal).min())
+            separates = bool((np.asarray(orient2d(start, end, other)) < 0.0).all())
+            if gap > best or separates:
+                best, best_edge, axis = gap, edge, normal if own is first else -normal
+            if separates:
+                return SatResult(False, axis, max(gap, 5e-324), edge, tested)
+    return SatResult(True, axis, min(best, 0.0), best_edge, len(axes))
+
+
+def _axes(polygon: Array) -> list[list[int]]:
+    """Return the edges of each axis of a polygon (n, 2), in the order of the first ones: parallel edges share one."""
+    along = np.roll(polygon, -1, axis=0) - polygon
+    turn = np.arctan2(along[:, 1], along[:, 0]) % np.pi
+    order = np.argsort(turn, kind="stable")
+    same = np.diff(turn[order], append=turn[order[0]] + np.pi) <= PARALLEL  # the next one in the circle is parallel
+    axes: list[list[int]] = [[]]
+    for k, joins in zip(order.tolist(), same.tolist(), strict=True):
+        axes[-1].append(k)
+        if not joins:
+            axes.append([])
+    axes[0] = axes.pop() + axes[0] if len(axes) > 1 else axes[0]  # those across the begin of the circle
+    return sorted(sorted(edges) for edges in axes if edges)
 
 
 def _counter_clockwise(points: ArrayLike) -> Array:

@@ -43,8 +43,7 @@ MEMORY: Final = PAIRS + 2 * MOST_PAIRS
 BETWEEN: Final = PAIRS
 """Bounds on the squared distances of the triangles of two leaves (m^2); also the pairs of `touching_triangles`."""
 
-# columns of an answer
-SQUARED: Final = 0
+# columns of an answer behind its first one, the distance
 ON_A: Final = 1
 ON_B: Final = 4
 PLACE_A: Final = 7

@@ -180,7 +180,9 @@ def solid_contact(
     X = relative(pose.R_A, pose.R_B, pose.p)
     Y = inverse(X)
     work, row = memory.tree, memory.tree[NEAR_A : NEAR_A + CONTACT_SIZE]
-    best, found, enough, examined = limit, False, limit, 0
+    lengths = abs(table.size[b, 0]) + abs(table.size[b, 1]) + abs(table.size[b, 2]) + abs(table.size[b, 3])
+    round_off = SAT_ROUND_OFF * (sum_of_sizes(pose.p) + reach_in(blocks, root) + lengths)  # of the bounds of boxes
+    best, found, enough, examined = limit, False, limit + round_off, 0
     work[0], work[1] = -inf, WIDTH * root
     waiting = 1
     while waiting > 0:  # terminates: each box is opened once

@@ -66,8 +66,8 @@ def _is_over(x, S, n, nn):
 
 
 @inlined
-def _pierces(x, y, S, n):
-    """Whether the segment from x to y passes through the triangle S with normal n; the ends lie on both sides."""
+def _pierces(x, y, S):
+    """Whether the segment from x to y passes through the triangle S; the ends lie on both sides of its plane."""
     d = minus(y, x)
     a, b, c = minus(S.a, x), minus(S.b, x), minus(S.c, x)
     u, v, w = dot(cross(a, b), d), dot(cross(b, c), d), dot(cross(c, a), d)
@@ -87,13 +87,13 @@ def _heights(S, T, n):
 
 
 @inlined
-def _crossing(S, T, h, n):
-    """Whether an edge of S passes through T, and a point of it there; h: heights of S's corners, n: normal of T."""
-    if h[0] * h[1] <= 0.0 and h[0] != h[1] and _pierces(S.a, S.b, T, n):
+def _crossing(S, T, h):
+    """Whether an edge of S passes through T, and a point of it there; h: heights of S's corners above T's plane."""
+    if h[0] * h[1] <= 0.0 and h[0] != h[1] and _pierces(S.a, S.b, T):
         return True, along(S.a, h[0] / (h[0] - h[1]), minus(S.b, S.a))
-    if h[1] * h[2] <= 0.0 and h[1] != h[2] and _pierces(S.b, S.c, T, n):
+    if h[1] * h[2] <= 0.0 and h[1] != h[2] and _pierces(S.b, S.c, T):
         return True, along(S.b, h[1] / (h[1] - h[2]), minus(S.c, S.b))
-    if h[2] * h[0] <= 0.0 and h[2] != h[0] and _pierces(S.c, S.a, T, n):
+    if h[2] * h[0] <= 0.0 and h[2] != h[0] and _pierces(S.c, S.a, T):
         return True, along(S.c, h[2] / (h[2] - h[0]), minus(S.a, S.c))
     return False, S.a
 
@@ -113,10 +113,10 @@ def crossing_point(S, T):
     g = _heights(T, S, n)
     if _all_on_one_side(g):
         return False, S.a
-    found, x = _crossing(S, T, h, m)
+    found, x = _crossing(S, T, h)
     if found:
         return True, x
-    return _crossing(T, S, g, n)
+    return _crossing(T, S, g)
 
 
 @inlined
@@ -156,9 +156,9 @@ def closest_triangle_points(S, T):
         if mm > 0.0 and over * over < best * mm and _is_over(x, T, m, mm):
             best, on_s, on_t = over * over / mm, x, along(x, -over / mm, m)
     if not (_all_on_one_side(g) or _all_on_one_side(h)):
-        found, x = _crossing(S, T, h, m)
+        found, x = _crossing(S, T, h)
         if not found:
-            found, x = _crossing(T, S, g, n)
+            found, x = _crossing(T, S, g)
         if found:
             return Closest(0.0, x, x)
     return Closest(best, on_s, on_t)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
-from collision_monitor.meshes.extent import extents
+from collision_monitor.meshes.extent import tree_extents
 from collision_monitor.meshes.trees.shape_trees import shape_tree
 from collision_monitor.query.body import PosedShapes, QueryBody
 from collision_monitor.shapes.pose import Pose
@@ -46,4 +46,4 @@ def _reach(pieces: PosedShapes, directions: Array) -> Array:
     if tree is None:
         return reach(pieces, directions)
     radius = shape.radius if isinstance(shape, Points) else 0.0
-    return extents(tree, directions @ pose.rotation) + directions @ pose.position + radius
+    return tree_extents(tree, directions @ pose.rotation) + directions @ pose.position + radius

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from collision_monitor._jit import allocating_kernel, device, inlined
+from collision_monitor.checks.numbers import as_numbers, checked_number, checked_whole
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.vector import cross, dot
-from collision_monitor.query.arguments import finite_number, whole_number
 from collision_monitor.tolerances import EPSILON, LARGEST_INPUT
 
 MOST_BOXES: Final = 8192
@@ -104,16 +104,13 @@ def edge_edge_impact(
 
 
 def _impacts(x: ArrayLike, face: bool, separation: float, tolerance: float | None, budget: int) -> FeatureImpact:
-    try:
-        points = np.ascontiguousarray(x, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"x: expected numbers of shape (..., 8, 3), got {type(x).__name__}") from None
+    points = np.ascontiguousarray(as_numbers(x, "x"))
     if points.ndim < 2 or points.shape[-2:] != (8, 3):
         raise InputError(f"x: expected four points at the start and at the end, (..., 8, 3), got shape {points.shape}")
     if not (np.abs(points) <= LARGEST_INPUT).all():
         raise InputError(f"x: expected finite coordinates up to {LARGEST_INPUT:g}, got NaN, infinity or larger")
-    wanted, most = finite_number("separation", separation), whole_number("budget", budget)
-    near = 0.0 if tolerance is None else finite_number("tolerance", tolerance, positive=True)
+    wanted, most = checked_number(separation, "separation", least=0.0), checked_whole(budget, "budget")
+    near = 0.0 if tolerance is None else checked_number(tolerance, "tolerance", least=0.0, above=True)
     flat = points.reshape(-1, 8, 3)
     status, lower, upper = np.empty(len(flat), np.uint8), np.empty(len(flat)), np.empty(len(flat))
     _solve(flat, face, wanted, near, most, (status, lower, upper))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any, Final, NamedTuple
 
-from collision_monitor.query.arguments import finite_number, whole_number
+from collision_monitor.checks.numbers import checked_number, checked_whole
 
 ITERATIONS: Final = 1000
 """Default limit of distance queries for one pair of pieces; hardly any pair needs more than 20."""
@@ -31,8 +31,8 @@ def check_query(horizon: float, tolerance: float, separation: float, iterations:
 @lru_cache(maxsize=16, typed=True)
 def _checked(horizon: Any, tolerance: Any, separation: Any, iterations: Any) -> MotionQuery:
     return MotionQuery(
-        horizon=finite_number("horizon", horizon),
-        tolerance=finite_number("tolerance", tolerance, positive=True),
-        separation=finite_number("separation", separation),
-        iterations=whole_number("iterations", iterations),
+        horizon=checked_number(horizon, "horizon", least=0.0),
+        tolerance=checked_number(tolerance, "tolerance", least=0.0, above=True),
+        separation=checked_number(separation, "separation", least=0.0),
+        iterations=checked_whole(iterations, "iterations"),
     )

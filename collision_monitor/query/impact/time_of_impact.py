@@ -7,11 +7,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from collision_monitor.checks.numbers import checked_number
 from collision_monitor.errors import TooCostlyError
 from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.impact.mesh_pair import SURFACES
 from collision_monitor.meshes.trees.shape_trees import CERTAIN
-from collision_monitor.query.arguments import finite_number
 from collision_monitor.query.body import KeptSlots, PosedShapes, QueryBody, kept_slots, laid_out
 from collision_monitor.query.contact.contact import check_kinds, contact, plant_bodies, plant_for_meshes
 from collision_monitor.query.contact.contact_kernel import contact_row
@@ -30,8 +30,10 @@ from collision_monitor.query.impact.impact_query import ITERATIONS, MotionQuery,
 from collision_monitor.query.impact.moving_body import MovingBody, check_bounded, moving_body, touching_pieces
 from collision_monitor.records import Method
 from collision_monitor.shapes.compound import Compound
+from collision_monitor.shapes.convex_pieces import is_concave_mesh
 from collision_monitor.shapes.pose import Motion, as_motion
 from collision_monitor.shapes.reach import reach
+from collision_monitor.shapes.registry import Mesh
 from collision_monitor.tolerances import GJK_TOUCHING
 
 DEEPENING_TIMES: Final = 40
@@ -70,7 +72,7 @@ def time_of_impact(
     """
     query = check_query(horizon, tolerance, separation, iterations)
     if method != "conservative_advancement":
-        duration = finite_number("step", step, positive=True)
+        duration = checked_number(step, "step", least=0.0, above=True)
         return impact_by_method(shape_a, motion_a, shape_b, motion_b, query, method, duration)
     motion_a, motion_b = as_motion(motion_a, "motion A"), as_motion(motion_b, "motion B")
     kept_a, kept_b = kept_slots(shape_a), kept_slots(shape_b)
@@ -133,9 +135,10 @@ def _certain_start(a: MovingBody, b: MovingBody, query: MotionQuery) -> tuple[fl
     round_off = round_off_of(a.body, b.body)
     if found.signed_distance < query.separation - round_off:
         return 0.0, 0.0, method
-    is_known = a.body.inside == b.body.inside == CERTAIN
+    concave = [shape for side in (a, b) for shape, _ in side.body.shapes if is_concave_mesh(shape)]
+    is_known = all(isinstance(each, Mesh) and each.surface.certain and each.surface.closed for each in concave)
     touch = query.separation == 0.0 and found.signed_distance <= round_off
-    if is_known and touch and found.signed_distance - found.error_bound < -round_off:
+    if concave and is_known and touch and found.signed_distance - found.error_bound < -round_off:
         # faces of concave solids in one plane: they may overlap, although no depth shows
         sure = first_certain_overlap((a.body.slots.first, b.body.slots.first), (a.motion, b.motion), query)
         return 0.0, 0.0 if sure <= 0.0 else sure, method

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from collision_monitor.checks.numbers import checked_rows
+from collision_monitor.errors import PoseError
 from collision_monitor.query.batch_result import BatchResult, Pairs
 from collision_monitor.query.impact.impact import Impact, impact_of_times
 from collision_monitor.query.impact.impact_kernel import MEMORY, TOUCHES, impacts_of_chains
@@ -20,7 +22,6 @@ from collision_monitor.query.pair_arrays import (
     Progress,
     Shapes,
     batch_shapes,
-    number_rows,
     pair_count,
     pair_ranges,
     part,
@@ -28,6 +29,7 @@ from collision_monitor.query.pair_arrays import (
     pose_rows,
 )
 from collision_monitor.shapes.pose import Motion
+from collision_monitor.tolerances import LARGEST_INPUT
 
 Array = NDArray[np.float64]
 
@@ -132,7 +134,7 @@ time_of_impact_batch = times_of_impact
 
 def _motions(poses: Any, twists: ArrayLike, name: str) -> Array:
     """Checked poses, twists and no acceleration side by side (N, 16)."""
-    x, v = pose_rows(poses, f"poses {name}"), number_rows(twists, 6, f"twists {name}")
+    x, v = pose_rows(poses, f"poses {name}"), checked_rows(twists, 6, f"twists {name}", LARGEST_INPUT, PoseError)
     rows = np.zeros((pair_count(**{f"poses {name}": len(x), f"twists {name}": len(v)}), 16))
     rows[:, :7], rows[:, 7:13] = x, v
     return rows

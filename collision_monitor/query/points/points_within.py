@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.checks.numbers import checked_number
 from collision_monitor.errors import ShapeError, UnsupportedError
-from collision_monitor.query.arguments import finite_number
 from collision_monitor.query.body import exact_body
 from collision_monitor.query.points.near_points import near_points
 from collision_monitor.shapes.compound import Compound
@@ -37,4 +37,4 @@ def points_within(
     if body.is_planar:
         plane = " and ".join(sorted({type(each).__name__ for each, _ in body.shapes}))
         raise UnsupportedError(f"points_within: expected solid shapes, got {plane}")
-    return near_points(cloud, pose, body, shape_pose, finite_number("limit", limit))
+    return near_points(cloud, pose, body, shape_pose, checked_number(limit, "limit", least=0.0))

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
+from collision_monitor.checks.numbers import real_array
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.coordinates import Array, Booleans, coordinates
 from collision_monitor.shapes.compound import Compound, shape_pairs
@@ -53,7 +54,7 @@ def cast_ray(
     pose = as_pose(pose, "pose")
     p, d = coordinates(origin, "origin", 3), coordinates(direction, "direction", 3)
     try:
-        limit = np.asarray(length, dtype=np.float64)
+        limit = real_array(length)
     except (TypeError, ValueError, OverflowError):
         limit = np.array(np.nan)
     if not (limit >= 0.0).all():

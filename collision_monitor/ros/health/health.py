@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Final
 
+from collision_monitor.alerts.rules_in_force import RuleInForce
 from collision_monitor.codec import MonitorStatus
 from collision_monitor.errors import Refusal
 from collision_monitor.ros.health.line_report import DiagnosticLevel, LineReport
@@ -19,6 +20,9 @@ from collision_monitor.session import Recording
 
 HISTORY: Final = 10
 """Reports over which counters are compared: a single refusal stays visible for about 10 s."""
+
+NAMED: Final = 5
+"""Things of the sources file that a report names; it counts the others."""
 
 UNMONITORED: Final = (Refusal.UNKNOWN_ID, Refusal.SHAPE)
 """Refusals that mean an object which no answer covers and no other report mentions. An object whose states are refused
@@ -43,7 +47,8 @@ class NodeFacts:
     stale, unseen: the names of such objects. deferred, unresolved: most pairs in one step since the last report.
     longest, longest_step: duration (s) and number of the longest step since the node was configured.
     outdated: messages that were left out because newer states waited. is_reduced: the effort of the steps is reduced.
-    other_nodes: nodes of the same name. sources: the lines of the sources file; None: there is no file.
+    other_nodes: nodes of the same name. sources: the lines of the sources file; None: there is no file. unmonitored:
+    what the file asks for and is not monitored, in words. rules: those in force.
     """
 
     status: MonitorStatus
@@ -60,6 +65,8 @@ class NodeFacts:
     longest: float
     longest_step: int
     sources: tuple[LineReport, ...] | None = None
+    unmonitored: tuple[str, ...] = ()
+    rules: tuple[RuleInForce, ...] = ()
 
 
 @dataclass
@@ -125,7 +132,9 @@ def reports(state: str, failure: str, facts: NodeFacts | None, history: LastRepo
         _recording(facts.status, history),
     ]
     if facts.sources is not None:
-        found.append(_sources(facts.sources, history))
+        found.append(_sources(facts.sources, facts.unmonitored, history))
+    if facts.rules:
+        found.append(_rules(facts.rules))
     history.add(facts)
     return found
 
@@ -222,8 +231,12 @@ def _recording(status: MonitorStatus, history: LastReports) -> Report:
     return findings.report("recording", f"recording to {status.recording_path}" if is_on else "not recording", values)
 
 
-def _sources(lines: tuple[LineReport, ...], history: LastReports) -> Report:
+def _sources(lines: tuple[LineReport, ...], unmonitored: tuple[str, ...], history: LastReports) -> Report:
     findings = _Findings()
+    for text in unmonitored[:NAMED]:
+        findings.add(DiagnosticLevel.ERROR, f"not monitored: {text}")
+    if len(unmonitored) > NAMED:
+        findings.add(DiagnosticLevel.ERROR, f"not monitored: {len(unmonitored) - NAMED} more, see ~/sources")
     for line in lines:
         if line.level == DiagnosticLevel.ERROR:
             findings.add(DiagnosticLevel.ERROR, f"unusable: {line.text}")
@@ -233,7 +246,18 @@ def _sources(lines: tuple[LineReport, ...], history: LastReports) -> Report:
             findings.add(DiagnosticLevel.WARN, line.text)
     refused = sum({line.name: line.refused for line in lines}.values())  # a robot has several lines
     values: dict[str, object] = {"messages": sum(line.messages for line in lines), "refused": refused}
+    if unmonitored:
+        values["not monitored"] = len(unmonitored)
     return findings.report("sources", f"{len(lines)} topics", values)
+
+
+def _rules(rules: tuple[RuleInForce, ...]) -> Report:
+    findings = _Findings()
+    for rule in rules:
+        if not rule.is_whole:
+            findings.add(DiagnosticLevel.WARN, f"rule {rule.name!r} {rule.summary}")
+    values: dict[str, object] = {rule.name: rule.summary for rule in rules}
+    return findings.report("rules", f"{len(rules)} in force, each covers somebody", values)
 
 
 def _texts(values: dict[str, object]) -> dict[str, str]:

@@ -13,6 +13,9 @@ from collision_monitor.pipeline.pipeline import Pipeline
 PERIOD: Final = 10_000_000_000
 """ns between two lines about the same problem: a flood of wrong messages must not become a flood of lines."""
 
+FIRST_LOOKS: Final = 10
+"""Looks of `report_unseen`, twice a second, before the log says that no state arrived at all."""
+
 NAMED: Final = 5
 """Objects that a line names."""
 
@@ -35,6 +38,8 @@ class RefusalLog:
         self._refused = dict(pipeline.refused)
         self._restarts = pipeline.restarts
         self._problems: dict[tuple[str, str], _Problem] = {}  # by topic and kind
+        self._unseen: set[int] = set()  # at the last look
+        self._looks = 0
 
     def report(self, topic: str, now: int) -> None:
         """Log what was refused in a message of this topic, and whether the message restarted the timeline."""
@@ -55,9 +60,23 @@ class RefusalLog:
         stale = self._pipeline.stale()
         if not stale:
             return
-        problem = self._problems.setdefault((topic, "stale"), _Problem())
-        problem.count = 0  # one line is about all of them, however often they were found stale
-        self.note(topic, "stale", f"no usable new state of object {named(stale)}: stale", 1, now)
+        self._remind(topic, "stale", f"no usable new state of object {named(stale)}: stale", now)
+
+    def report_unseen(self, topic: str, now: int) -> None:
+        """Log that no state arrived so far, or which objects have none: at the second look, then every 10 s."""
+        unseen = self._pipeline.unseen()
+        lasting = {object_id: name for object_id, name in unseen.items() if object_id in self._unseen}
+        self._unseen = set(unseen)
+        if not self._pipeline.has_begun and self._looks >= FIRST_LOOKS:
+            self._remind(topic, "none", "no state arrived so far, neither here nor from a sources file", now)
+        elif lasting:
+            self._remind(topic, "unseen", f"no state so far of object {named(lasting)}: nothing is known about it", now)
+        self._looks += 1
+
+    def _remind(self, topic: str, kind: str, text: str, now: int) -> None:
+        """Log a state that lasts: at once and every 10 s, without a count."""
+        self._problems.setdefault((topic, kind), _Problem()).count = 0
+        self.note(topic, kind, text, 1, now)
 
     def catch_up(self, now: int) -> None:
         """Log what has waited for its line. Call it regularly."""

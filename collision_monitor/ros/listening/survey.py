@@ -20,6 +20,8 @@ from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.sources import Decoder, Mapping
 from collision_monitor.sources.ground.frames import frame_name
 from collision_monitor.sources.kinds import BY_TYPE
+from collision_monitor.sources.messages.marker_arrays import MarkerArrays
+from collision_monitor.sources.messages.transform_arrays import TransformArrays
 from collision_monitor.sources.robot.robot_template import is_of_robot
 
 LOOK_PERIOD: Final = 0.2
@@ -50,12 +52,12 @@ class TopicFacts:
         """Take over what a message holds."""
         now = time.monotonic()
         self.first, self.last, self.messages = self.first or now, now, self.messages + 1
-        for each in getattr(content, "transforms", ()):
-            self.parents[frame_name(each.child_frame_id)] = frame_name(each.header.frame_id)
-        for each in getattr(content, "markers", [content] if hasattr(content, "ns") else []):
-            self.frames.add(frame_name(each.header.frame_id))
-            self.markers.add(each.ns)
-        if hasattr(content, "header") and not hasattr(content, "ns"):
+        if isinstance(content, TransformArrays):
+            self.parents |= dict(zip(map(frame_name, content.children), map(frame_name, content.parents), strict=True))
+        elif isinstance(content, MarkerArrays):
+            self.frames |= set(map(frame_name, content.frames))
+            self.markers |= set(content.namespaces)
+        elif hasattr(content, "header"):
             self.frames.add(frame_name(content.header.frame_id))
 
 
@@ -117,6 +119,7 @@ def check(mapping: Mapping, seconds: float) -> list[LineReport]:
         sources = LiveSources(listener.node, mapping, lambda given: None, lambda name, text, count: None)
         sources.begin()
         listener.listen(seconds)
+        sources.close()
         return sources.lines()
 
 

@@ -23,7 +23,7 @@ from collision_monitor.ros.managed import Managed
 from collision_monitor.ros.monitor.live_rules import LiveRules
 from collision_monitor.ros.monitor.live_settings import LiveSettings
 from collision_monitor.ros.monitor.monitoring import Monitoring
-from collision_monitor.ros.parameters import read_monitor_parameters
+from collision_monitor.ros.parameters import begin_node, read_monitor_parameters
 from collision_monitor.ros.process import StopRequest
 from collision_monitor.settings.profile import Profile
 
@@ -35,7 +35,7 @@ class MonitorNode(Managed, Node):
     """
 
     def __init__(self, stop: StopRequest) -> None:
-        Node.__init__(self, NODE, automatically_declare_parameters_from_overrides=True)
+        begin_node(self, NODE)
         try:
             self.settings = read_monitor_parameters(self)
         except CollisionMonitorError:

@@ -30,6 +30,7 @@ from collision_monitor.ros.health.refusal_log import RefusalLog, named
 from collision_monitor.ros.health.status_line import status_line
 from collision_monitor.ros.health.step_peaks import StepPeaks
 from collision_monitor.ros.health.step_times import StepTimes
+from collision_monitor.ros.monitor.alert_outputs import AlertOutputs
 from collision_monitor.ros.monitor.contact_readers import ContactReaders
 from collision_monitor.ros.monitor.keeping_up import KeepingUp
 from collision_monitor.ros.monitor.markers import MarkerView
@@ -42,7 +43,7 @@ from collision_monitor.warm_up import warm_up_alerts
 
 if TYPE_CHECKING:
     from collision_monitor.ros.monitor.live_sources import LiveSources
-    from collision_monitor.sources import Input, Mapping
+    from collision_monitor.sources import Input, Mapping, Unmonitored
 
 WATCHDOG_PERIOD: Final = 0.5
 """s: without steps the status is still published at least this often, so that silence never means "clear"."""
@@ -87,13 +88,10 @@ class Monitoring:
         self._last_step: int | None = None  # when the monitor's time last changed
         self._last_stamp: int | None = None
         self._was_silent = False
-        self._empty_classes: list[str] = []  # at the last look
         self._is_event_wanted = settings.splitting.on_event
 
         self._contacts_out = answer_publisher(node, Topic.CONTACTS)
         self._predictions_out = answer_publisher(node, Topic.PREDICTIONS)
-        self._alerts_out = answer_publisher(node, Topic.ALERTS)
-        self._raised_out = answer_publisher(node, Topic.RAISED_ALERTS)
         self._status_out = answer_publisher(node, Topic.STATUS)
         self._markers_out = answer_publisher(node, Topic.MARKERS)
         self._monitored = Monitored(node, self._pipeline.catalogue, settings.frame_id)
@@ -108,6 +106,9 @@ class Monitoring:
         self._readers = ContactReaders(readable, self._recording, self._pipeline)
         self._keeping_up = KeepingUp(states, self._times, self._refusals, profile, enabled=settings.keep_up)
         self._sources = self._live_sources(settings.sources)
+        self._alerts = AlertOutputs(node, self._pipeline, self._unmonitored)
+        if self._sources is not None:
+            resources.callback(self._sources.close)
         node.create_timer(WATCHDOG_PERIOD, self._on_watchdog, clock=Clock(clock_type=ClockType.STEADY_TIME))
         gc.unfreeze()  # what an earlier configuration kept
         _keep_from_collector()
@@ -119,7 +120,7 @@ class Monitoring:
             f"listening on {states.topic_name} and {shapes.topic_name}, "
             f"profile {profile.name}, frame {settings.frame_id}, {self._recording}"
         )
-        self._check_rules()
+        self._alerts.check_rules()
 
     # -- activation
 
@@ -156,6 +157,10 @@ class Monitoring:
             self._refusals.note("sources", name, text, count, time.monotonic_ns())
 
         return LiveSources(self._node, mapping, take, warn)
+
+    def _unmonitored(self) -> tuple[Unmonitored, ...]:
+        """Return what the sources file asks for and is not monitored."""
+        return () if self._sources is None else self._sources.unmonitored
 
     # -- states: one step
 
@@ -196,14 +201,7 @@ class Monitoring:
         if self._readers.found or not self._readers.are_there:  # no first message without details
             self._contacts_out.publish(outputs.contacts)
         self._monitored.move(states.data)  # before the alerts, which a guard compares with them
-        self._publish_alerts(outputs.alerts)
-
-    def _publish_alerts(self, alerts: tuple[bytes, ...]) -> None:
-        for each in alerts:
-            self._alerts_out.publish(each)
-        raised = self._pipeline.has_raised_alerts and self._raised_out.get_subscription_count()
-        if alerts or raised:
-            self._raised_out.publish(self._pipeline.raised_alerts())
+        self._alerts.publish_step(outputs.alerts)
 
     def _record_step(self, states: bytes, outputs: Outputs, received: int) -> None:
         """Record a step in the order that a replay needs: how far the step came, the inputs, the answers."""
@@ -255,7 +253,7 @@ class Monitoring:
         self._use(self._keeping_up.reduced(profile))
         self._times.longest_latency = profile.max_time_step
         self._logger.info(f"settings changed, profile {profile.name}")
-        self._check_rules()
+        self._alerts.check_rules()
 
     def _use(self, profile: Profile) -> None:
         """Take the next steps with this profile, with the details of contacts only if anything reads them."""
@@ -273,22 +271,8 @@ class Monitoring:
         event = self._pipeline.change_rules(rules, now, self._name)
         self._recording.write(Topic.SETTINGS, event, now, now, settings=self._pipeline.settings())
         self._logger.info(f"rules of the alerts changed: {', '.join(each.name for each in rules.rules) or 'none'}")
-        self._check_rules()
-
-    def _check_rules(self) -> None:
-        """Warn if a rule asks for more than the predictions tell."""
-        horizon, longest = self._pipeline.profile.horizon, self._pipeline.rules.longest_time
-        if longest > horizon:
-            self._logger.warning(
-                f"a rule has a threshold of {longest:g} s, and collisions are predicted only {horizon:g} s ahead: "
-                "raise the parameter horizon"
-            )
-
-    def _warn_of_empty_classes(self) -> None:
-        empty = self._pipeline.empty_classes
-        if empty and empty != self._empty_classes:
-            self._logger.warning(f"rules: no object belongs to the class {', '.join(empty)}")
-        self._empty_classes = empty
+        self._alerts.check_rules()
+        self._alerts.publish()
 
     def _record_shapes(self, data: bytes, received: int) -> None:
         """Record an ObjectDescriptionArray that the pipeline has processed, with all objects described since then."""
@@ -310,15 +294,15 @@ class Monitoring:
             self._log_silence(silent)
         if not silent:
             self._refusals.report_stale(self._states_in, now)
+        self._refusals.report_unseen(self._states_in, now)
         self._refusals.catch_up(now)
         if (profile := self._keeping_up.look(now)) is not None:
             self._use(profile)
         self._publish_status_if_due(now)
-        if self._pipeline.rules.text:
-            self._raised_out.publish(self._pipeline.raised_alerts())
+        self._alerts.publish()
         if now - self._last_log >= LOG_PERIOD and not silent and self._last_step is not None:
             self._last_log = now
-            self._warn_of_empty_classes()
+            self._alerts.warn_of_empty_classes()
             line = status_line(codec.decode_status(self._publish_status()))
             self._logger.info(line if self.is_active else f"inactive, nothing is published: {line}")
 
@@ -368,6 +352,8 @@ class Monitoring:
             longest=self._times.longest,
             longest_step=self._times.longest_step,
             sources=None if self._sources is None else tuple(self._sources.lines()),
+            unmonitored=tuple(row.text for row in self._unmonitored()),
+            rules=self._alerts.report(),
         )
 
     def _now(self) -> int:

@@ -11,7 +11,9 @@ from functools import cache
 from pathlib import Path
 
 from collision_monitor.errors import SessionError
+from collision_monitor.settings.regular_file import found_instead, read_regular
 
+_LARGEST = 1 << 20
 _SEPARATOR = "=" * 80
 _FIELD = re.compile(r"^\s*(?:([a-z]\w*)/)?([A-Z]\w*)(?:\[[^]]*\])?\s+[a-z]\w*", re.MULTILINE)
 
@@ -46,8 +48,8 @@ def _read(type_name: str, suffix: str) -> str:
     package, _, name = type_name.split("/")
     for root in _roots():
         path = root / package / "msg" / f"{name}.{suffix}"
-        if path.is_file():
-            return path.read_text(encoding="utf-8")
+        if not found_instead(path):
+            return read_regular(path, most=_LARGEST, refused=SessionError).decode(errors="replace")
     if suffix == "msg" and type_name in _carried():
         return _carried()[type_name]
     raise SessionError(

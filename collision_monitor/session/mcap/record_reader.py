@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import zlib
 from collections.abc import Callable, Iterable, Iterator
 from io import SEEK_CUR, BytesIO
@@ -10,13 +11,14 @@ from typing import Any, BinaryIO, Final, NamedTuple
 
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
-from mcap.records import Attachment, Channel, Header, Metadata, Schema
+from mcap.records import Attachment, Channel, Header, Metadata, Schema, Statistics
 
 from collision_monitor.errors import SessionError
 from collision_monitor.session.mcap.chunk import LARGEST_CHUNK, Unpacker, records
 from collision_monitor.session.mcap.definitions_in_force import LARGEST_DEFINITION, DefinitionsInForce
-from collision_monitor.session.mcap.layout import CHUNK_HEAD, HEAD, MAGIC, MESSAGE
+from collision_monitor.session.mcap.layout import CHUNK_HEAD, FOOTER, HEAD, MAGIC, MESSAGE
 from collision_monitor.session.mcap.sentences import add_sentence
+from collision_monitor.settings.regular_file import open_regular
 
 _GLANCE: Final = 256
 """Bytes of a record that hold its times and its name."""
@@ -31,6 +33,9 @@ _LARGEST: Final[dict[int, int]] = {
     Opcode.CHANNEL: LARGEST_DEFINITION,
 }
 """Bytes of a record that is read; longer ones are damage. Records of other kinds are skipped unread."""
+
+_LARGEST_SUMMARY: Final = 64 << 20
+"""Bytes of the schemas, channels and statistics in a summary: those of 10,000 topics."""
 
 _DEFINITIONS: Final = 1 << 17
 """Schemas and channels in one chunk: there are 2^16 ids of each."""
@@ -58,15 +63,22 @@ class McapReader:
         self.position = 0
         self._unpacker = Unpacker(0)
         self._in_force = DefinitionsInForce()
-        try:
-            self.size = path.stat().st_size
-            with path.open("rb") as file:
-                magic = file.read(len(MAGIC))
-        except OSError as error:
-            raise SessionError(f"{path}: expected a file that can be read, got: {error.strerror}") from None
+        with self._open() as file:
+            self.size = os.fstat(file.fileno()).st_size
+            magic = file.read(len(MAGIC)) or b""
         if magic != MAGIC:
             what = f"it begins with {magic!r}" if magic else "the file is empty"
             raise SessionError(f"{path}: expected an MCAP file, but {what}")
+
+    def opened(self) -> BinaryIO:
+        """Open the file, to read its records from the start on."""
+        self.damage = []
+        self._unpacker = Unpacker(self.size)
+        self._in_force = DefinitionsInForce()
+        return self._open()
+
+    def _open(self) -> BinaryIO:
+        return open_regular(self.path, "an MCAP file", refused=SessionError)
 
     def __iter__(self) -> Iterator[Any]:
         """Yield header, schemas, channels, messages, metadata and attachments, also those in chunks.
@@ -77,38 +89,97 @@ class McapReader:
 
     def read(self, begin: int = 0) -> Iterator[Any]:
         """Yield the same. begin: offset of a record; the records from the first message up to it are skipped."""
-        self.damage = []
-        self._unpacker = Unpacker(self.size)
-        self._in_force = DefinitionsInForce()
-        with self.path.open("rb") as file:
-            for start, opcode, length in self._heads(file):
-                limit = _LARGEST.get(opcode, 0)
-                if not 0 < length <= limit:
-                    if limit:
-                        found = f"expected 1 to {limit} bytes"
-                        self._note(f"{_name(opcode)} of {length} bytes at byte {start} is damaged: {found}")
-                    file.seek(length, SEEK_CUR)
-                    continue
-                # The library raises many kinds of errors for wrong bytes. Each means that the record is damaged.
-                try:
-                    found_records = self._unpack(opcode, file.read(length))
-                except Exception as error:
-                    reason = str(error) or repr(error)
-                    self._note(f"{_name(opcode)} of {length} bytes at byte {start} is damaged: {reason}")
-                    continue
+        count = 0
+        with self.opened() as file:
+            for start, found_records in self._sections(file):
                 for record in found_records:
-                    if start < begin and isinstance(record, Message):
-                        file.seek(begin)
-                        break
+                    if isinstance(record, Message):
+                        if start < begin:
+                            file.seek(begin)
+                            break
+                        count += 1
                     yield record
+        if self.position == self.size and not (begin or self.damage):
+            self._compare(count)
+
+    def sections(self) -> Iterator[tuple[int, Iterable[Any]]]:
+        """Yield the offset of each record in the file, with the records that it holds: those of a chunk, or itself."""
+        with self.opened() as file:
+            yield from self._sections(file)
+
+    def record_at(self, file: BinaryIO, start: int) -> Iterable[Any]:
+        """Return what the record at an offset holds, which `sections` yielded before. file: from `opened`.
+
+        Raises SessionError.
+        """
+        file.seek(start)
+        try:
+            opcode, length = HEAD.unpack(file.read(HEAD.size))
+            return self._unpack(opcode, file.read(length))
+        except Exception as error:  # as above
+            raise SessionError(f"{self.path}: expected the bytes of before, got others: {error}") from None
+
+    def _sections(self, file: BinaryIO) -> Iterator[tuple[int, Iterable[Any]]]:
+        for start, opcode, length in self._heads(file):
+            limit = _LARGEST.get(opcode, 0)
+            if not 0 < length <= limit:
+                if limit:
+                    found = f"expected 1 to {limit} bytes"
+                    self._note(f"{_name(opcode)} of {length} bytes at byte {start} is damaged: {found}")
+                file.seek(length, SEEK_CUR)
+                continue
+            # The library raises many kinds of errors for wrong bytes. Each means that the record is damaged.
+            try:
+                found_records = self._unpack(opcode, file.read(length))
+            except Exception as error:
+                reason = str(error) or repr(error)
+                self._note(f"{_name(opcode)} of {length} bytes at byte {start} is damaged: {reason}")
+                continue
+            yield start, found_records
 
     def glance(self) -> Iterator[tuple[int, int, bytes]]:
         """Yield offset, opcode and first bytes of each record in the file, without unpacking it."""
         self.damage = []
-        with self.path.open("rb") as file:
+        with self._open() as file:
             for start, opcode, length in self._heads(file):
                 yield start, opcode, file.read(min(length, _GLANCE))
                 file.seek(start + HEAD.size + length)
+
+    def summary(self) -> Iterator[tuple[int, bytes]]:
+        """Yield kind and content of the schemas, channels and statistics in the summary; nothing if there is none.
+
+        Raises ValueError if the file does not end like an MCAP file, or if they are too large.
+        """
+        with self._open() as file:
+            file.seek(max(0, self.size - len(MAGIC) - FOOTER.size - HEAD.size))
+            end = file.read()
+            head = HEAD.unpack_from(end) if len(end) == HEAD.size + FOOTER.size + len(MAGIC) else (0, 0)
+            if head != (Opcode.FOOTER, FOOTER.size) or not end.endswith(MAGIC):
+                raise ValueError("its end is no end of an MCAP file")
+            at = FOOTER.unpack_from(end, HEAD.size)[0] or self.size
+            room = _LARGEST_SUMMARY
+            while at + HEAD.size <= self.size:
+                file.seek(at)
+                opcode, length = HEAD.unpack(file.read(HEAD.size))
+                if opcode == Opcode.FOOTER or length > self.size - at - HEAD.size:
+                    return
+                if opcode in (Opcode.STATISTICS, *_DEFINED):
+                    room -= length
+                    if room < 0:
+                        raise ValueError(f"its summary is larger than {_LARGEST_SUMMARY} bytes")
+                    yield opcode, file.read(length)
+                at += HEAD.size + length
+
+    def _compare(self, count: int) -> None:
+        """Compare the number of messages that were read with the statistics of the summary."""
+        try:
+            for opcode, content in self.summary():
+                if opcode == Opcode.STATISTICS:
+                    stated = Statistics.read(ReadDataStream(BytesIO(content))).message_count
+                    if stated != count:
+                        self._note(f"its summary states {stated} messages, there are {count}")
+        except Exception:  # the library raises many kinds of errors; a summary is not needed to read a session
+            return
 
     def _note(self, text: str) -> None:
         add_sentence(self.damage, text)

@@ -36,6 +36,7 @@ from collision_monitor.session.mcap.definitions_in_force import DefinitionsInFor
 from collision_monitor.session.mcap.layout import LIBRARY, MESSAGE, SALVAGE, SEQUENCE_HALF
 from collision_monitor.session.mcap.sentences import add_sentence
 from collision_monitor.session.output_file import check_output
+from collision_monitor.settings.regular_file import FOLDER, found_instead, open_regular
 
 _DECODERS: Final[dict[int, Any]] = {
     Opcode.HEADER: Header,
@@ -72,21 +73,16 @@ def salvage(source: str | Path, target: str | Path, *, unverified: bool = False,
     nothing can be recovered, or if `target` exists and `overwrite` is false.
     """
     source, target = Path(source), Path(target)
-    if not source.is_file():
-        found = (
-            "a folder: name one of its files"
-            if source.is_dir()
-            else "something else"
-            if source.exists()
-            else "nothing there"
+    if found := found_instead(source):
+        raise SessionError(
+            f"{source}: expected an MCAP file, got {found}{': name one of its files' if found == FOLDER else ''}"
         )
-        raise SessionError(f"{source}: expected an MCAP file, got {found}")
     if target.exists() and not (target.is_file() or target.is_dir()):  # it would be replaced by a file
         raise SessionError(f"{target}: expected a file that can be written, got a device")
     check_output(target, overwrite=overwrite, inputs=[source])
     try:
-        with source.open("rb") as file:
-            if source.stat().st_size == 0:
+        with open_regular(source, "an MCAP file", refused=SessionError) as file:
+            if os.fstat(file.fileno()).st_size == 0:
                 raise SessionError(f"{source}: expected an MCAP file, but the file is empty")
             with mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as data:
                 return _write(data, source, target, unverified)

@@ -160,11 +160,7 @@ class Recorder:
             self._is_full = False
             sequence = self._next_sequence & SEQUENCE_MASK
             entry = QueueEntry("", b"", self._last_log_time, 0, sequence, snapshot=snapshot)
-            if (
-                not self._closing
-                and self._state is Recording.ON
-                and self._waiting + entry.cost <= self._queue_bytes
-            ):
+            if not self._closing and self._state is Recording.ON and self._waiting + entry.cost <= self._queue_bytes:
                 self._queue.append(entry)
                 self._waiting += entry.cost
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Final
 
+from collision_monitor.checks.numbers import checked_number
 from collision_monitor.errors import SessionError
 
 
@@ -25,9 +26,7 @@ class Splitting:
 
     def __post_init__(self) -> None:
         for name in ("size", "duration", "before", "after"):
-            value = getattr(self, name)
-            if not 0 <= value < float("inf"):
-                raise SessionError(f"recording, {name}: expected a finite number, at least 0, got {value!r}")
+            checked_number(getattr(self, name), f"recording, {name}", least=0.0, error=SessionError)
 
     @property
     def makes_files(self) -> bool:

@@ -110,6 +110,7 @@ KIND: Final = Kind(
     feature=_feature,
     corners=lambda shape: shape.points,
     middle=lambda shape: np.asarray(shape.points.mean(axis=0)),
+    scaled=lambda shape, factor: ConvexHull(factor * shape.points),
     simple=False,
 )
 

@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.checks.numbers import real_array, real_number
 from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.contact_features import Feature, FeatureType
 from collision_monitor.records import ShapeType
@@ -34,8 +35,8 @@ class HalfSpace(Shape):
 
     def __post_init__(self) -> None:
         try:
-            normal = np.array(self.normal, dtype=np.float64)
-            offset = float(self.offset)
+            normal = np.array(real_array(self.normal))
+            offset = real_number(self.offset)
         except (TypeError, ValueError, OverflowError):
             got = f"{self.normal!r}, {self.offset!r}"
             raise ShapeError(f"HalfSpace: expected a normal (3) and an offset, got {got}") from None
@@ -75,5 +76,6 @@ KIND: Final = Kind(
     triangles=lambda shape: plane_triangles(np.asarray(shape.normal), shape.offset),
     feature=lambda shape, x, n, tie, off: Feature(FeatureType.FACE, (), 0),
     middle=lambda shape: np.asarray(shape.offset * shape.normal),
+    scaled=lambda shape, factor: HalfSpace(shape.normal, factor * shape.offset),
     bounded=False,
 )

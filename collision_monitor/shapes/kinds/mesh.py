@@ -9,6 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.checks.numbers import hides_some
 from collision_monitor.errors import ShapeError, UnsupportedError
 from collision_monitor.geometry.contact_features import Feature, mesh_feature_at
 from collision_monitor.geometry.inside import locate_in_welded_surface
@@ -43,6 +44,8 @@ class Mesh(Shape):
         vertices = point_rows(self.vertices, "Mesh vertices", 3, 3)
         try:
             faces = np.array(self.faces)
+            if hides_some(self.faces):
+                raise TypeError
         except (TypeError, ValueError, OverflowError):
             got = type(self.faces).__name__
             raise ShapeError(f"Mesh faces: expected an array of shape (m, 3), got {got}") from None

@@ -6,7 +6,7 @@ that drives and turns steadily. Source: Lynch and Park, Modern Robotics (2017), 
 
 from __future__ import annotations
 
-from collections import deque
+from bisect import bisect_left
 from dataclasses import dataclass
 from typing import Final
 
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.shapes.pose import from_rotation_vector, multiply, rotation_matrix
-from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
+from collision_monitor.tolerances import LARGEST_INPUT
 
 Floats = NDArray[np.float64]
 
@@ -24,8 +24,23 @@ HISTORY: Final = 10_000_000_000
 MOST_SAMPLES: Final = 4096
 """Samples of one frame."""
 
+MOST_SAMPLES_IN_ALL: Final = 400_000
+"""Samples of a tree, 0.3 kB each. With more than 100 frames, each may have fewer than MOST_SAMPLES."""
+
 MOST_FRAMES: Final = 10_000
-"""Frames of a tree. A robot has 100."""
+"""Frames of a tree. A robot has 100. Those without a sample for HISTORY make room for new ones."""
+
+MOST_LINKS_BETWEEN: Final = 256
+"""Links from a frame to the root of its tree, 0.2 ms each. A robot has 30; tf2 allows 1000."""
+
+LONGEST_FRAME_NAME: Final = 256
+"""Characters of a name of a frame."""
+
+SQUARED_NORM: Final = 0.01
+"""Largest difference from 1 of the squared norm of a quaternion of tf, as in tf2."""
+
+_SHOWN: Final = 12
+"""Frames that a text names."""
 
 _NANOSECOND: Final = 1e-9
 
@@ -85,13 +100,49 @@ def frame_name(name: str) -> str:
     return name.removeprefix("/")
 
 
+def checked_poses(poses: Floats) -> list[tuple[Floats, Floats] | None]:
+    """Return position and unit quaternion of poses (N, 7); None for those that are no poses.
+
+    As in tf2, the quaternion may have a squared norm of 1 up to SQUARED_NORM.
+    """
+    position, quaternion = np.ascontiguousarray(poses[:, :3]), np.ascontiguousarray(poses[:, 3:])
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        squared = (quaternion**2).sum(1)
+        usable = (np.abs(position) <= LARGEST_INPUT).all(1) & (np.abs(squared - 1.0) <= SQUARED_NORM)
+        unit = quaternion / np.sqrt(squared)[:, None]
+    return [(position[k], unit[k]) if good else None for k, good in enumerate(usable.tolist())]
+
+
 class _Link:
-    """The samples of a frame in its parent, oldest first."""
+    """The samples of a frame in its parent, oldest first: stamps, and positions with quaternions."""
+
+    __slots__ = ("parent", "poses", "stamps", "static")
 
     def __init__(self, parent: str, static: bool) -> None:
         self.parent = parent
         self.static = static
-        self.samples: deque[tuple[int, Floats, Floats]] = deque(maxlen=MOST_SAMPLES)  # stamp, position, quaternion
+        self.stamps: list[int] = []
+        self.poses: list[tuple[Floats, Floats]] = []
+
+    def put(self, stamp_ns: int, pose: tuple[Floats, Floats], most: int) -> bool:
+        """Add a sample in its place. Return whether it is within the history."""
+        stamps = self.stamps
+        if not stamps or stamp_ns > stamps[-1]:
+            stamps.append(stamp_ns)
+            self.poses.append(pose)
+        elif stamp_ns < stamps[-1] - HISTORY:
+            return False
+        else:
+            k = bisect_left(stamps, stamp_ns)
+            if stamps[k] == stamp_ns:  # sent again, or corrected
+                self.poses[k] = pose
+                return True
+            stamps.insert(k, stamp_ns)
+            self.poses.insert(k, pose)
+        old = max(bisect_left(stamps, stamps[-1] - HISTORY), len(stamps) - most)
+        if old > 0:
+            del stamps[:old], self.poses[:old]
+        return True
 
 
 class FrameTree:
@@ -100,54 +151,86 @@ class FrameTree:
     def __init__(self, max_age: float) -> None:
         self._links: dict[str, _Link] = {}
         self._max_age = round(max_age / _NANOSECOND)
+        self._answers: dict[tuple[str, str, int], FrameMotion | MissingFrame] = {}  # until the tree changes
 
     @property
     def names(self) -> list[str]:
         """Names of all frames that were mentioned."""
         return sorted({*self._links, *(link.parent for link in self._links.values())})
 
+    @property
+    def some_names(self) -> str:
+        """The first of these names, for texts."""
+        names = self.names
+        more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+        return ", ".join(f"{name:.80}" for name in names[:_SHOWN]) + more or "none"
+
     def put(
         self, parent: str, child: str, position: Floats, quaternion: Floats, stamp_ns: int, *, static: bool
     ) -> str | None:
         """Add the pose of a frame in its parent at a stamp. Return the reason if it cannot be used."""
-        usable = np.abs(position).max() <= LARGEST_INPUT and np.abs(quaternion).max() <= 2.0  # False for NaN
-        length = float(np.sqrt(quaternion @ quaternion)) if usable else 0.0
-        if abs(length - 1.0) > UNIT_QUATERNION:
-            return f"transform from {parent!r} to {child!r}: expected finite numbers and a unit quaternion"
+        (pose,) = checked_poses(np.concatenate([position, quaternion])[None])
+        return self.put_checked(parent, child, pose, stamp_ns, static=static)
+
+    def put_checked(
+        self, parent: str, child: str, pose: tuple[Floats, Floats] | None, stamp_ns: int, *, static: bool
+    ) -> str | None:
+        """Add a pose of `checked_poses`. Return the reason if it cannot be used."""
+        if pose is None:
+            what = f"transform from {parent!r:.80} to {child!r:.80}"
+            return f"{what}: expected finite numbers and a unit quaternion"
         if parent == child:
-            return f"transform from {parent!r} to itself"
+            return f"transform from {parent!r:.80} to itself"
+        if len(parent) > LONGEST_FRAME_NAME or len(child) > LONGEST_FRAME_NAME:
+            return f"transform to {child!r:.80}: expected names of at most {LONGEST_FRAME_NAME} characters"
+        if self._answers:
+            self._answers.clear()
         link = self._links.get(child)
-        if link is None and len(self._links) >= MOST_FRAMES:
-            return f"transform to {child!r}: expected at most {MOST_FRAMES} frames"
-        if link is None or link.parent != parent or link.static != static or static:
+        if link is None and len(self._links) >= MOST_FRAMES and not self._forget_silent(stamp_ns):
+            return f"transform to {child!r:.80}: expected at most {MOST_FRAMES} frames"
+        if link is None or static or link.parent != parent or link.static:
             link = self._links[child] = _Link(parent, static)
-        samples = link.samples
-        if samples and stamp_ns <= samples[-1][0]:
-            if stamp_ns == samples[-1][0]:  # sent again, or corrected
-                samples.pop()
-            else:
-                return None  # late: history stays in order
-        samples.append((stamp_ns, position, quaternion / length))
-        while samples[-1][0] - samples[0][0] > HISTORY:
-            samples.popleft()
+        most = min(MOST_SAMPLES, max(2, MOST_SAMPLES_IN_ALL // len(self._links)))
+        if not link.put(stamp_ns, pose, most):
+            return f"transform to {child!r:.80}: it is older than the last one by more than {HISTORY * 1e-9:g} s"
         return None
+
+    def _forget_silent(self, now_ns: int) -> bool:
+        """Forget the moving frames that have no sample within the history; return whether there were some."""
+        silent = [
+            frame for frame, link in self._links.items() if not link.static and link.stamps[-1] < now_ns - HISTORY
+        ]
+        for frame in silent:
+            del self._links[frame]
+        return bool(silent)
 
     def motion(self, target: str, source: str, stamp_ns: int) -> FrameMotion | MissingFrame:
         """Return the motion of `source` in `target` at a stamp, or why it is not known."""
         if target == source:
             return IDENTITY
+        key = target, source, stamp_ns
+        found = self._answers.get(key)
+        if found is None:
+            if len(self._answers) >= MOST_SAMPLES:
+                self._answers.clear()
+            found = self._answers[key] = self._motion(target, source, stamp_ns)
+        return found
+
+    def _motion(self, target: str, source: str, stamp_ns: int) -> FrameMotion | MissingFrame:
         upward, downward = self._chain(source), self._chain(target)
         common = next((frame for frame in upward if frame in downward), None)
         if common is None:
-            known = ", ".join(self.names) or "none"
-            return MissingFrame(f"no transform from {target!r} to {source!r}; frames known from tf: {known}")
+            if max(len(upward), len(downward)) > MOST_LINKS_BETWEEN:
+                text = f"expected at most {MOST_LINKS_BETWEEN} transforms between {target!r:.80} and {source!r:.80}"
+                return MissingFrame(f"{text}, got more")
+            return MissingFrame(
+                f"no transform from {target!r:.80} to {source!r:.80}; frames known from tf: {self.some_names}"
+            )
         down = self._motion_in(common, target, stamp_ns)
-        up = self._motion_in(common, source, stamp_ns)
-        if isinstance(up, MissingFrame):
-            return up
         if isinstance(down, MissingFrame):
             return down
-        return down.inverse() @ up
+        up = self._motion_in(common, source, stamp_ns)
+        return up if isinstance(up, MissingFrame) else down.inverse() @ up
 
     def nearest_moving(self, frame: str) -> str | None:
         """Return the frame itself, or the first above it, whose link to its parent is not static."""
@@ -156,12 +239,16 @@ class FrameTree:
     def restart(self) -> None:
         """Forget all samples that are not static."""
         self._links = {frame: link for frame, link in self._links.items() if link.static}
+        self._answers.clear()
 
-    def _chain(self, frame: str) -> list[str]:
-        """Return the frame and all above it. A loop is walked once."""
-        chain = [frame]
-        while (link := self._links.get(chain[-1])) is not None and link.parent not in chain:
-            chain.append(link.parent)
+    def _chain(self, frame: str) -> dict[str, None]:
+        """Return the frame and all above it, in this order. A loop is walked once, and a longer way than any is cut."""
+        chain = {frame: None}
+        while (link := self._links.get(frame)) is not None and link.parent not in chain:
+            frame = link.parent
+            chain[frame] = None
+            if len(chain) > MOST_LINKS_BETWEEN:
+                break
         return chain
 
     def _motion_in(self, ancestor: str, frame: str, stamp_ns: int) -> FrameMotion | MissingFrame:
@@ -177,22 +264,19 @@ class FrameTree:
 
     def _sample(self, frame: str, link: _Link, stamp_ns: int) -> FrameMotion | MissingFrame:
         """Return the motion of a frame in its parent at a stamp."""
-        samples = link.samples
-        last, first = samples[-1], samples[0]
+        stamps, poses = link.stamps, link.poses
         if link.static:
-            return FrameMotion(last[1], last[2], AT_REST, AT_REST)
-        if not first[0] - self._max_age <= stamp_ns <= last[0] + self._max_age:
-            side = "older" if stamp_ns > last[0] else "newer"
+            return FrameMotion(*poses[-1], AT_REST, AT_REST)
+        if not stamps[0] - self._max_age <= stamp_ns <= stamps[-1] + self._max_age:
+            side = "older" if stamp_ns > stamps[-1] else "newer"
             return MissingFrame(
-                f"the transform from {link.parent!r} to {frame!r} is {side} than the message by more than max_age, "
-                f"{self._max_age * _NANOSECOND:g} s"
+                f"the transform from {link.parent!r:.80} to {frame!r:.80} is {side} than the message by more than "
+                f"max_age, {self._max_age * _NANOSECOND:g} s"
             )
-        if len(samples) == 1:
-            return FrameMotion(last[1], last[2], AT_REST, AT_REST, twist_known=False, moving=True)
-        k = len(samples) - 1
-        while k > 1 and samples[k - 1][0] >= stamp_ns:
-            k -= 1
-        return _screw(samples[k - 1], samples[k], stamp_ns)
+        if len(stamps) == 1:
+            return FrameMotion(*poses[-1], AT_REST, AT_REST, twist_known=False, moving=True)
+        k = min(max(bisect_left(stamps, stamp_ns), 1), len(stamps) - 1)
+        return _screw((stamps[k - 1], *poses[k - 1]), (stamps[k], *poses[k]), stamp_ns)
 
 
 def _screw(a: tuple[int, Floats, Floats], b: tuple[int, Floats, Floats], stamp_ns: int) -> FrameMotion:

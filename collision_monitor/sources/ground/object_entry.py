@@ -31,7 +31,7 @@ NUMBERS: Final = {
 }
 """Keys with a number, their units and defaults."""
 
-KEYS: Final = (*PLACE, *BODY, "covariance", "without", *NUMBERS)
+KEYS: Final = (*PLACE, *BODY, "covariance", "without", "nan_is_free", *NUMBERS)
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,8 @@ class ObjectEntry:
     markers of the namespace. shapes: empty if the messages hold them. each: the shape of each object of a
     group, in place of those in the messages. pose: of a static object, in `frame` (empty: the
     monitor's). covariance: whether covariances in the messages are used. without: names of the objects
-    whose points a scan leaves out. given: the keys that the file holds. The numbers are those of NUMBERS.
+    whose points a scan leaves out. nan_is_free: whether its NaN mean that nothing is there. given: the keys that the
+    file holds. The numbers are those of NUMBERS.
     """
 
     name: str
@@ -74,6 +75,7 @@ class ObjectEntry:
     max_range: float = 1e9
     clearance: float = 0.0
     without: tuple[str, ...] = ()
+    nan_is_free: bool = False
     given: tuple[str, ...] = ()
 
     def describe(
@@ -179,6 +181,7 @@ def _entry(name: str, content: dict[str, Any], object_id: int) -> ObjectEntry:
         allowed=tuple(map(str, allowed)),
         without=tuple(map(str, without)),
         covariance=truth(content.get("covariance", True), f"{name}, covariance"),
+        nan_is_free=truth(content.get("nan_is_free", False), f"{name}, nan_is_free"),
         given=tuple(content),
         **values,
     )

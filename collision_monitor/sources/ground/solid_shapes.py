@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from collision_monitor.errors import InputError
 from collision_monitor.shapes.registry import Box, Cone, Cylinder, HalfSpace, Mesh, Shape, Sphere, kind_of
@@ -39,9 +40,16 @@ def primitive_shapes(primitive: Any) -> list[Shape]:
 
 
 def mesh_shape(mesh: Any) -> Shape:
-    """Return the shape of a shape_msgs/Mesh. Raises ShapeError."""
-    vertices = np.array([(p.x, p.y, p.z) for p in mesh.vertices]).reshape(-1, 3)
-    return Mesh(vertices, np.array([t.vertex_indices for t in mesh.triangles], np.int64).reshape(-1, 3))
+    """Return the shape of a shape_msgs/Mesh, decoded or as `message_arrays` left it. Raises ShapeError."""
+    vertices, triangles = mesh if isinstance(mesh, tuple) else message_arrays(mesh)
+    return Mesh(vertices, triangles)
+
+
+def message_arrays(mesh: Any) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Return vertices (n, 3) and triangles (m, 3) of a shape_msgs/Mesh."""
+    vertices = np.array([(p.x, p.y, p.z) for p in mesh.vertices], np.float64).reshape(-1, 3)
+    indices = np.concatenate([np.zeros(0, np.int64), *(t.vertex_indices for t in mesh.triangles)])
+    return vertices, indices.astype(np.int64).reshape(-1, 3)
 
 
 def plane_shape(plane: Any) -> Shape:

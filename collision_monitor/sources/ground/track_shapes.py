@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 Measured = tuple[int, NDArray[np.float64]]
 """A kind, and full extents (3,) or corners (n, 3) in m."""
+
+LEAST_EXTENT: Final = 0.01
+"""m: extents of 0, of flat or unmeasured things, count as this. An object without a shape would not be monitored."""
+
+
+def with_extent(sizes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return extents in which 0 has become LEAST_EXTENT. Negative numbers and NaN stay, and are refused."""
+    return np.where(sizes == 0.0, LEAST_EXTENT, sizes)
 
 
 def rounded_up(measured: Measured, tolerance: float) -> Measured:

@@ -4,6 +4,10 @@ The velocity is the slope of the line through the positions of a window, by leas
 position has the standard deviation s, that of the slope is s / sqrt(sum (t - mean t)^2). Source: any textbook on linear
 regression, such as Draper and Smith, Applied Regression Analysis (1998), 1.4. The angular velocity is that of the
 rotation from the first to the last pose of the window.
+
+Poses are kept by time, however many a window holds: beside the newest one, BINS means of the poses of equal parts of
+the window. A mean with its number of poses counts as these poses do; only their spread within the bin is lost, which
+is 1/BINS^2 of that of the window.
 """
 
 from __future__ import annotations
@@ -20,8 +24,11 @@ Floats = NDArray[np.float64]
 States = NDArray[np.void]
 Slots = NDArray[np.int64]
 
-SAMPLES: Final = 16
-"""Poses of each object that are kept."""
+BINS: Final = 16
+"""Means of poses of each object beside its newest pose."""
+
+_BIN: Final = np.dtype([("first", "i8"), ("time", "f8"), ("count", "f8"), ("position", "f8", 3), ("turn", "f8", 4)])
+"""Stamp (ns) and quaternion of the first pose; mean time (s) after it; number of poses; mean position."""
 
 _UNKNOWN: Final = int(StateFlag.TWIST_UNKNOWN)
 _NANOSECOND: Final = 1e-9
@@ -31,8 +38,7 @@ class TwistEstimator:
     """The last poses of each object, by slot, and the twists estimated from them."""
 
     def __init__(self) -> None:
-        self._stamps = np.zeros((0, SAMPLES), np.int64)
-        self._poses = np.zeros((0, SAMPLES, 7))
+        self._bins = np.zeros((0, BINS + 1), _BIN)  # the first one holds the newest pose alone
         self._counts = np.zeros(0, np.int64)
         self._twists = np.zeros((0, 8))  # linear, angular, and their standard deviations
         self._known = np.zeros(0, np.bool_)
@@ -41,15 +47,14 @@ class TwistEstimator:
     def grow(self, slots: int) -> None:
         """Make room for so many slots."""
         more = slots - len(self._counts)
-        self._stamps = np.concatenate([self._stamps, np.zeros((more, SAMPLES), np.int64)])
-        self._poses = np.concatenate([self._poses, np.zeros((more, SAMPLES, 7))])
+        self._bins = np.concatenate([self._bins, np.zeros((more, BINS + 1), _BIN)])
         self._counts = np.append(self._counts, np.zeros(more, np.int64))
         self._twists = np.concatenate([self._twists, np.zeros((more, 8))])
         self._known = np.append(self._known, np.zeros(more, np.bool_))
         self._windowed = np.append(self._windowed, np.zeros(more, np.bool_))
 
     def forget(self, slot: int) -> None:
-        """Forget the poses of an object."""
+        """Forget the poses of a slot."""
         self._counts[slot], self._known[slot] = 0, False
 
     def restart(self) -> None:
@@ -62,21 +67,36 @@ class TwistEstimator:
         self._known[slots[~unknown]] = False
         usable = unknown & np.isfinite(states["position"]).all(1) & np.isfinite(states["quaternion"]).all(1)
         slots, poses = slots[usable], states[usable]
-        newer = (self._counts[slots] == 0) | (stamp_ns > self._stamps[slots, 0])
+        newer = (self._counts[slots] == 0) | (stamp_ns > self._bins["first"][slots, 0])
         slots, poses = slots[newer], poses[newer]
         if len(slots) == 0:
             return states
-        self._stamps[slots, 1:], self._poses[slots, 1:] = self._stamps[slots, :-1], self._poses[slots, :-1]
-        self._stamps[slots, 0] = stamp_ns
-        self._poses[slots, 0] = np.concatenate([poses["position"], poses["quaternion"]], axis=1)
-        self._counts[slots] = np.minimum(self._counts[slots] + 1, SAMPLES)
+        self._put(slots, poses, stamp_ns, round(window / _NANOSECOND / BINS))
         self._windowed[slots] = window > 0.0
         enough = self._counts[slots] > 1
         slots = slots[enough]
         self._known[slots] = True
         stddevs = poses["position_stddev"][enough], poses["orientation_stddev"][enough]
-        self._twists[slots] = _fit(self._stamps[slots], self._poses[slots], self._counts[slots], window, *stddevs)
+        self._twists[slots] = _fit(self._bins[slots], self._counts[slots], window, *stddevs)
         return states
+
+    def _put(self, slots: Slots, poses: States, stamp_ns: int, width: int) -> None:
+        """Add the newest poses; the ones before join the bin of their time, of `width` ns, or begin one."""
+        bins, counts = self._bins[slots], self._counts[slots]
+        last, bin_ = bins[:, 0], bins[:, 1]
+        joins = (counts > 1) & (last["first"] - bin_["first"] < width)
+        number = bin_["count"] + 1.0
+        share = np.where(joins, 1.0 / number, 0.0)
+        moved = bins.copy()
+        moved["time"][:, 1] += share * ((last["first"] - bin_["first"]) * _NANOSECOND - bin_["time"])
+        moved["position"][:, 1] += share[:, None] * (last["position"] - bin_["position"])
+        moved["count"][joins, 1] = number[joins]
+        moved[~joins, 1:] = bins[~joins, :-1]
+        newest = moved[:, 0]
+        newest["first"], newest["time"], newest["count"] = stamp_ns, 0.0, 1.0
+        newest["position"], newest["turn"] = poses["position"], poses["quaternion"]
+        self._bins[slots] = moved
+        self._counts[slots] = np.where(joins, counts, np.minimum(counts + 1, BINS + 1))
 
     def write(self, states: Any, slots: Slots, *, everywhere: bool) -> None:
         """Write the estimated twists into states; only those over a window unless `everywhere`."""
@@ -93,26 +113,22 @@ class TwistEstimator:
 
 
 def _fit(
-    stamps: NDArray[np.int64],
-    poses: Floats,
-    counts: NDArray[np.int64],
-    window: float,
-    position_stddev: Floats,
-    orientation_stddev: Floats,
+    bins: Any, counts: NDArray[np.int64], window: float, position_stddev: Floats, orientation_stddev: Floats
 ) -> Floats:
-    """Return twists (N, 6) and their standard deviations (N, 2) from poses (N, SAMPLES, 7), the newest first."""
-    times = (stamps - stamps[:, :1]) * _NANOSECOND
-    order = np.arange(SAMPLES)
+    """Return twists (N, 6) and their standard deviations (N, 2) from bins (N, BINS + 1), the newest pose first."""
+    times = (bins["first"] - bins["first"][:, :1]) * _NANOSECOND + bins["time"]
+    order = np.arange(BINS + 1)
     used = (order < counts[:, None]) & ((times >= -window) | (order < 2))
-    number = used.sum(1)
-    centred = np.where(used, times - (times * used).sum(1, keepdims=True) / number[:, None], 0.0)
-    spread = (centred**2).sum(1)
-    relative = poses[:, :, :3] - poses[:, :1, :3]
-    linear = (centred[:, :, None] * np.where(used[:, :, None], relative, 0.0)).sum(1) / spread[:, None]
-    oldest = number - 1
-    rows = np.arange(len(poses))
-    elapsed = -times[rows, oldest]
-    turn = multiply(poses[:, 0, 3:], poses[rows, oldest, 3:] * (-1.0, -1.0, -1.0, 1.0))
+    weight = np.where(used, bins["count"], 0.0)
+    number = weight.sum(1)
+    centred = np.where(used, times - (times * weight).sum(1, keepdims=True) / number[:, None], 0.0)
+    spread = (weight * centred**2).sum(1)
+    relative = np.where(used[:, :, None], bins["position"] - bins["position"][:, :1], 0.0)
+    linear = ((weight * centred)[:, :, None] * relative).sum(1) / spread[:, None]
+    oldest = used.sum(1) - 1
+    rows = np.arange(len(bins))
+    elapsed = (bins["first"][:, 0] - bins["first"][rows, oldest]) * _NANOSECOND
+    turn = multiply(bins["turn"][:, 0], bins["turn"][rows, oldest] * (-1.0, -1.0, -1.0, 1.0))
     turn *= np.where(turn[:, 3:] < 0.0, -1.0, 1.0)
     sine = np.sqrt((turn[:, :3] ** 2).sum(1))
     rate = np.where(sine > 0.0, 2.0 * np.arctan2(sine, turn[:, 3]) / np.where(sine > 0.0, sine, 1.0), 2.0) / elapsed

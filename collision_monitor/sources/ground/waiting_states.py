@@ -12,7 +12,7 @@ from collision_monitor import records
 from collision_monitor.codec.states import COVARIANCE_SIZE
 from collision_monitor.errors import PoseError
 from collision_monitor.records import StateFlag
-from collision_monitor.shapes.pose import Pose, from_rotation_vector, multiply
+from collision_monitor.shapes.pose import Pose, from_rotation_vector, multiply, rotation_matrix
 from collision_monitor.sources.ground.twist_estimate import TwistEstimator
 
 Floats = NDArray[np.float64]
@@ -48,9 +48,13 @@ class WaitingStates:
         self._stamps = np.zeros(0, np.int64)
         self._covariances = np.zeros((0, COVARIANCE_SIZE))
         self._waits = np.zeros(0, np.bool_)
+        self._seen = np.zeros(0, np.bool_)  # since the time began
+        self._turns = np.zeros(0, np.bool_)
 
-    def put(self, states: States, stamp_ns: int, covariance: Floats | None, window: float) -> None:
-        """Store states (N,), each id once, unless a newer one waits. window: as in `Scene.observe`."""
+    def put(
+        self, states: States, stamp_ns: int, covariance: Floats | None, window: float, *, turns: bool = False
+    ) -> None:
+        """Store states (N,), each id once, unless a newer one waits. window, turns: as in `SourceScene.observe`."""
         slots = self._slots_of(states["id"].tolist())
         newer = self._waits[slots] & (self._stamps[slots] > stamp_ns)  # two publishers, or messages out of order
         if newer.any():
@@ -59,12 +63,15 @@ class WaitingStates:
         self._states[slots] = self._twists.completed(states, slots, stamp_ns, window)
         self._stamps[slots] = stamp_ns
         self._covariances[slots] = np.nan if covariance is None else covariance
-        self._waits[slots] = True
+        self._waits[slots] = self._seen[slots] = True
+        self._turns[slots] = turns
 
     def pose(self, object_id: int, stamp_ns: int) -> Pose | None:
         """Return the pose of an object at a stamp, from its last state; None if that is missing or too old."""
         slot = self._slots.get(object_id)
-        if slot is None or abs(stamp_ns - int(self._stamps[slot])) > self._max_age / NANOSECOND:
+        if slot is None or not self._seen[slot]:
+            return None
+        if abs(stamp_ns - int(self._stamps[slot])) > self._max_age / NANOSECOND:
             return None
         (state,) = self._step(stamp_ns, np.array([slot]), estimated=True).states
         try:
@@ -76,13 +83,13 @@ class WaitingStates:
         """Forget an object."""
         slot = self._slots.pop(object_id, None)
         if slot is not None:
-            self._waits[slot] = False
+            self._waits[slot] = self._seen[slot] = False
             self._twists.forget(slot)
             self._free.append(slot)
 
     def restart(self) -> None:
         """Forget all states."""
-        self._waits[:] = False
+        self._waits[:] = self._seen[:] = False
         self._twists.restart()
 
     def as_stamped(self) -> Iterator[Step]:
@@ -107,7 +114,7 @@ class WaitingStates:
         has_covariance = ~np.isnan(covariance[:, 0])
         elapsed = (stamp_ns - self._stamps[slots]) * NANOSECOND
         if elapsed.any():
-            _advance(states, covariance, elapsed)
+            _advance(states, covariance, elapsed, self._turns[slots])
         if not has_covariance.any():
             return Step(stamp_ns, states, None)
         for row in np.flatnonzero(~has_covariance):  # beside one that has, the others need theirs
@@ -131,19 +138,28 @@ class WaitingStates:
             self._states = np.append(self._states, np.zeros(more, records.STATE))
             self._stamps = np.append(self._stamps, np.zeros(more, np.int64))
             self._covariances = np.concatenate([self._covariances, np.full((more, COVARIANCE_SIZE), np.nan)])
-            self._waits = np.append(self._waits, np.zeros(more, np.bool_))
+            for name in ("_waits", "_seen", "_turns"):
+                setattr(self, name, np.append(getattr(self, name), np.zeros(more, np.bool_)))
             self._twists.grow(slot + more)
         return slot
 
 
-def _advance(states: Any, covariance: Floats, elapsed: NDArray[Any]) -> None:
-    """Move states (N,) by `elapsed` (N,) s at constant acceleration and angular velocity; widen their uncertainty."""
+def _advance(states: Any, covariance: Floats, elapsed: NDArray[Any], turns: NDArray[np.bool_]) -> None:
+    """Move states (N,) by `elapsed` (N,) s at constant acceleration and angular velocity; widen their uncertainty.
+
+    turns (N,): whether velocity and acceleration are constant along the axes of the body, and turn with it.
+    """
     accelerates = (states["flags"] & StateFlag.ACCELERATION_VALID) != 0
     acceleration = np.where(accelerates[:, None], states["acceleration"], 0.0)
     time = elapsed[:, None]
     states["position"] += (states["linear"] + 0.5 * acceleration * time) * time
     states["linear"] += acceleration * time
-    states["quaternion"] = multiply(from_rotation_vector(states["angular"] * time), states["quaternion"])
+    turn = from_rotation_vector(states["angular"] * time)
+    states["quaternion"] = multiply(turn, states["quaternion"])
     states["position_stddev"] = np.hypot(states["position_stddev"], states["velocity_stddev"] * elapsed)
     states["orientation_stddev"] = np.hypot(states["orientation_stddev"], states["angular_velocity_stddev"] * elapsed)
     covariance[:, :6] += covariance[:, 6:] * time**2  # of independent errors
+    if turns.any():
+        R = rotation_matrix(turn[turns])
+        for field in ("linear", "acceleration"):
+            states[field][turns] = (R @ states[field][turns][..., None])[..., 0]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.checks.numbers import as_numbers, checked_yaml_number
 from collision_monitor.codec.shape_fields import make_shape
 from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.records import ShapeType
@@ -50,18 +51,12 @@ def truth(value: Any, what: str) -> bool:
 
 def number(value: Any, what: str, unit: str, *, least: float = 0.0, most: float = 1e9) -> float:
     """Return a number in a range."""
-    is_number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not (is_number and least <= value <= most):
-        raise InputError(f"{what}: expected a number of {unit} from {least:g} to {most:g}, got {value!r}")
-    return float(value)
+    return checked_yaml_number(value, what, unit, least=least, most=most)
 
 
 def numbers(value: Any, what: str) -> NDArray[np.float64]:
     """Return an array of numbers."""
-    try:
-        return np.asarray(value, np.float64)
-    except (TypeError, ValueError, OverflowError):
-        raise InputError(f"{what}: expected numbers, got {value!r}") from None
+    return as_numbers(value, what)
 
 
 def pose(value: Any, what: str) -> Pose:

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.errors import CollisionMonitorError, InputError
+from collision_monitor.errors import InputError
 from collision_monitor.records import StateFlag
 from collision_monitor.shapes.pose import Pose, rotation_matrix
 from collision_monitor.shapes.registry import Box, Cylinder
@@ -20,10 +20,11 @@ from collision_monitor.sources.ground.covariances import usable_blocks, yaw_alon
 from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
-from collision_monitor.sources.ground.prisms import prism
+from collision_monitor.sources.ground.prisms import covering_prism, load_prisms
 from collision_monitor.sources.ground.scene_states import carry_states, empty_states, turn_twists, turned_triangles
+from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
-from collision_monitor.sources.ground.track_shapes import Measured, held_by, rounded_up, still_held
+from collision_monitor.sources.ground.track_shapes import Measured, held_by, rounded_up, still_held, with_extent
 from collision_monitor.sources.ground.tracks import DescribedTrack, TrackTable
 from collision_monitor.sources.messages.autoware_bytes import POLYGON, TrackArrays
 
@@ -32,6 +33,7 @@ PREDICTED: Final = "autoware_perception_msgs/msg/PredictedObjects"
 
 _BOX, _CYLINDER = 0, 1
 _NO_ORIENTATION = 0
+_NO_CORNERS: Final = np.zeros((0, 3))
 _LABELS: Final = (
     *("unknown", "car", "truck", "bus", "trailer", "motorcycle", "bicycle", "pedestrian", "animal", "hazard"),
     *("over_drivable", "under_drivable"),
@@ -42,26 +44,27 @@ Found = tuple[DescribedTrack, int]
 """A track and its row in a message."""
 
 
-class AutowareSource:
+class AutowareSource(Source):
     """The tracks of one entry, with the shapes in the messages or with the entry's `each`."""
 
     def __init__(self, entry: ObjectEntry, message_type: str, mapping: Mapping) -> None:
         entry.allow_only(("covariance", "forget_after", "min_existence", "shape_tolerance", "each"), message_type)
         if entry.shapes:
             raise InputError(f"{entry.name}, shape: {message_type} holds many objects; `each` is the shape of each")
-        self.topics = {entry.topic: (message_type,)}
+        self.name, self.topics = entry.name, {entry.topic: (message_type,)}
         self._entry = entry
-        self._tracks = TrackTable(entry.forget_after)
+        self._tracks = TrackTable(entry.name, entry.forget_after)
         self._number = 0
-
-    def begin(self, scene: SourceScene) -> None:
-        """See Source. A track is described when it appears."""
+        load_prisms()
+        self._heard_ns = 0  # stamp of the last message: a tracker that is silent does not say that a track is gone
 
     def take(self, topic: str, content: TrackArrays, stamp_ns: int, scene: SourceScene) -> None:
-        """See Source."""
+        """See Source. A track is described when it appears."""
         entry = self._entry
+        self._heard_ns = max(self._heard_ns, stamp_ns)
         frame = scene.locate(entry.name, frame_name(content.header.frame_id), stamp_ns)
-        wanted = ~(content.existence < entry.min_existence)  # NaN: not known
+        # NaN and negative numbers: not known
+        wanted = ~((content.existence >= 0.0) & (content.existence < entry.min_existence))
         seen: dict[bytes, int] = {}
         for row in np.flatnonzero(wanted).tolist():
             if content.uuids[row] in seen:
@@ -77,11 +80,16 @@ class AutowareSource:
         if kept:
             states, covariance = self._states(kept, content, scene)
             given = covariance if frame is IDENTITY else carry_states(states, frame, covariance)
-            scene.observe(states, stamp_ns, given)
+            scene.observe(entry.name, states, stamp_ns, given, turns=True)
 
     def settle(self, now_ns: int, scene: SourceScene) -> None:
         """See Source."""
-        self._tracks.expire(now_ns, scene)
+        self._tracks.expire(self._heard_ns, scene)
+
+    def restart(self, now_ns: int, scene: SourceScene) -> None:
+        """See Source."""
+        self._tracks.restart(now_ns)
+        self._heard_ns = now_ns
 
     def _track(self, key: bytes, label: int, stamp_ns: int, scene: SourceScene) -> DescribedTrack | None:
         if key not in self._tracks:
@@ -101,25 +109,33 @@ class AutowareSource:
             still = still_held(before, kinds[rows], sizes[rows], tolerance)
         kept = []
         for (track, row), held in zip(found, still.tolist(), strict=True):
-            if held or self._describe(track, (int(kinds[row]), sizes[row]), content.footprints.get(row), scene):
+            corners = content.footprints.get(row, _NO_CORNERS if content.kind[row] == POLYGON else None)
+            if held or self._describe(track, (int(kinds[row]), sizes[row]), corners, scene):
                 kept.append((track, row))
         return kept
 
     def _describe(self, track: DescribedTrack, measured: Measured, corners: Any, scene: SourceScene) -> bool:
-        """Describe one track. Return whether it is described."""
+        """Describe one track. corners: of a polygon, else None. Return whether it is described."""
         entry, tolerance = self._entry, self._entry.shape_tolerance
         if measured[0] == POLYGON and not entry.each:
             measured = POLYGON, np.column_stack([corners[:, :2], np.full(len(corners), measured[1][2])])
             if track.shape is not None and held_by(track.shape, measured, tolerance):
                 return True
         described = rounded_up(measured, tolerance)
-        try:
-            shapes, padding = (entry.each, 0.0) if entry.each else _shapes(described, tolerance)
+        with scene.guard(entry.name, track.name):
+            if not scene.may_describe:
+                raise InputError("it waits, because the message has too many new objects at once")
+            shapes, padding, coarse = (entry.each, 0.0, "") if entry.each else _shapes(described, tolerance)
             scene.describe(entry.describe(track.object_id, track.name, shapes, extra_padding=padding))
-        except CollisionMonitorError as error:
-            scene.refuse(entry.name, f"{track.name}: {error}")
-            return track.shape is not None
-        track.shape = described
+            track.shape = described
+            if corners is _NO_CORNERS and not entry.each:
+                coarse = "footprint: expected corners, got none; a disc of its dimensions is monitored"
+            if coarse:
+                scene.refuse(entry.name, f"{track.name}: {coarse}")
+        if track.shape is None:
+            scene.lacks(entry.name, track.name, scene.last_refusal[entry.name])
+            return False
+        scene.has(entry.name, track.name)
         return True
 
     def _states(self, kept: list[Found], content: TrackArrays, scene: SourceScene) -> tuple[Any, Any]:
@@ -156,24 +172,32 @@ class AutowareSource:
 
 
 def _measured(content: TrackArrays) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
-    """Return kinds (N,) and sizes (N, 3). A box without orientation counts as the cylinder about it."""
-    kinds, sizes = content.kind.copy(), content.size.copy()
+    """Return kinds (N,) and sizes (N, 3).
+
+    A box without orientation counts as the cylinder about it, and so does a polygon without corners.
+    """
+    kinds, sizes = content.kind.copy(), with_extent(content.size)
     around = (kinds == _BOX) & (content.orientation == _NO_ORIENTATION)
+    around |= (kinds == POLYGON) & ~np.isin(np.arange(len(kinds)), list(content.footprints))
     kinds[around] = _CYLINDER
     sizes[around, :2] = np.hypot(sizes[around, 0], sizes[around, 1])[:, None]
     return kinds, sizes
 
 
-def _shapes(described: tuple[int, NDArray[np.float64]], tolerance: float) -> tuple[Any, float]:
-    """Return shapes and how far the object may exceed them. Raises ShapeError, InputError."""
+def _shapes(described: tuple[int, NDArray[np.float64]], tolerance: float) -> tuple[Any, float, str]:
+    """Return shapes, how far the object may exceed them, and why they are not its own.
+
+    Raises ShapeError, InputError.
+    """
     kind, numbers = described
     if kind == POLYGON:
         height = float(numbers[0, 2]) if len(numbers) else 0.0
-        if not height > 0.0:
+        if len(numbers) and not height > 0.0:
             raise InputError(f"dimensions.z: expected a height above 0, got {height}")
-        return prism(numbers[:, :2], -height / 2, height / 2), tolerance
+        shapes, coarse = covering_prism(numbers[:, :2], -height / 2, height / 2)
+        return shapes, tolerance, coarse
     if kind == _BOX:
-        return ((Box(numbers), Pose()),), 0.0
+        return ((Box(numbers), Pose()),), 0.0, ""
     if kind == _CYLINDER:
-        return ((Cylinder(max(numbers[:2]) / 2, numbers[2]), Pose()),), 0.0
+        return ((Cylinder(max(numbers[:2]) / 2, numbers[2]), Pose()),), 0.0, ""
     raise InputError(f"shape.type: expected 0 (box), 1 (cylinder) or 2 (polygon), got {kind}")

@@ -139,11 +139,11 @@ def _aligned(at: int, size: int) -> int:
 
 
 def _likeliest(body: Any, at: int, classes: int) -> int:
-    """Return the label of the likeliest class; 0, unknown, without one."""
+    """Return the label of the likeliest class, the first of several; 0, unknown, without one. NaN is the least."""
     if classes > len(body) // 8:
         raise ValueError
     found = [_U1F4.unpack_from(body, at + 8 * k) for k in range(classes)]
-    return int(max(found, key=lambda each: each[1])[0]) if found else 0
+    return int(max(found, key=lambda each: each[1] if each[1] >= 0.0 else -1.0)[0]) if found else 0
 
 
 def _behind_paths(body: Any, at: int) -> int:

@@ -12,18 +12,21 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.errors import CollisionMonitorError, InputError
+from collision_monitor.errors import InputError
 from collision_monitor.query.points.points_within import points_within
 from collision_monitor.shapes.kinds.points import MOST_CLOUD_POINTS
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.registry import Points
-from collision_monitor.sources.ground.frames import frame_name
+from collision_monitor.shapes.registry import Points, Sphere
+from collision_monitor.sources.ground.frames import FrameMotion, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
+from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.ground.yaml_table import known
+from collision_monitor.sources.messages.laser_scans import SCAN, BeamMemory, read_beams, scan_points
 
-SCAN: Final = "sensor_msgs/msg/LaserScan"
+__all__ = ["CLOUD", "SCAN", "CloudSource", "read_cloud_points", "scan_points", "thinned"]
+
 CLOUD: Final = "sensor_msgs/msg/PointCloud2"
 
 Floats = NDArray[np.float64]
@@ -31,57 +34,71 @@ Floats = NDArray[np.float64]
 MOST_POINTS: Final = 4 * MOST_CLOUD_POINTS
 """Points of a message, before those without a place are dropped and the others are thinned."""
 
-_FORMATS: Final = {7: "f4", 8: "f8"}
-"""NumPy's names of PointField's float types."""
+_FORMATS: Final = {7: ("f4", 4), 8: ("f8", 8)}
+"""NumPy's names of PointField's float types, and their bytes."""
 
 
-class CloudSource:
+class CloudSource(Source):
     """The scan of one entry: points of the entry's `radius`, thinned to one for each cube of its `voxel`.
 
-    Points on the objects that `without` names are left out: those of the robot that carries the sensor.
+    Points on the objects that `without` names are left out: those of the robot that carries the sensor. A scan that
+    measured nothing is refused, and what the last one saw stays: a failed sensor does not make free space.
     """
 
     def __init__(self, entry: ObjectEntry, message_type: str, mapping: Mapping) -> None:
-        entry.allow_only(("radius", "voxel", "min_range", "max_range", "without", "clearance"), message_type)
+        keys = "radius", "voxel", "min_range", "max_range", "without", "clearance", "nan_is_free"
+        entry.allow_only(keys, message_type)
         if entry.shapes:
             raise InputError(f"{entry.name}, shape: {message_type} brings its own points; `radius` is theirs")
         for each in entry.without:
             known(each, [*(other.name for other in mapping.sources), *mapping.robots], f"{entry.name}, without")
-        self.topics = {entry.topic: (message_type,)}
+        self.name, self.topics = entry.name, {entry.topic: (message_type,)}
         self._entry = entry
-
-    def begin(self, scene: SourceScene) -> None:
-        """See Source. The first scan describes the object."""
+        self._memory = BeamMemory()
+        if entry.without:  # load the kernel before messages arrive
+            points_within(Points(np.zeros((1, 3)), 0.1), Pose(), ((Sphere(1.0), Pose()),), Pose(), 0.0)
 
     def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
-        """See Source."""
+        """See Source. The first scan describes the object."""
         entry = self._entry
         frame = scene.locate(entry.name, frame_name(content.header.frame_id), stamp_ns)
         if frame is None:
             return
-        try:
-            points, lost = read_cloud_points(content) if hasattr(content, "point_step") else scan_points(content)
-        except InputError as error:
-            scene.refuse(entry.name, str(error))
-            return
+        points, lost = self._cloud(content) if hasattr(content, "point_step") else self._scan(content, frame)
         scene.points_dropped[entry.name] += lost
-        squared = (points**2).sum(1)
-        points = points[(squared >= entry.min_range**2) & (squared <= entry.max_range**2)]
         points, radius = thinned(points, entry.voxel, entry.radius)
         if not len(points):  # nothing is there, as far as the scan says
             scene.remove(entry.object_id)
             return
-        try:
-            cloud, at = Points(points, radius), Pose(frame.position, frame.quaternion)
-            kept = ~self._on_robot(cloud, at, stamp_ns, scene)
-            if not kept.any():
-                scene.remove(entry.object_id)
-                return
-            if not kept.all():
-                cloud = Points(points[kept], radius)
-            scene.describe(entry.describe(shapes=((cloud, Pose()),), at=at))
-        except CollisionMonitorError as error:
-            scene.refuse(entry.name, str(error))
+        cloud, at = Points(points, radius), Pose(frame.position, frame.quaternion)
+        kept = ~self._on_robot(cloud, at, stamp_ns, scene)
+        if not kept.any():
+            scene.remove(entry.object_id)
+            return
+        if not kept.all():
+            cloud = Points(points[kept], radius)
+        scene.describe(entry.describe(shapes=((cloud, Pose()),), at=at))
+
+    def _scan(self, scan: Any, frame: FrameMotion) -> tuple[Floats, int]:
+        """Return the points of a LaserScan and of its failed beams, and the number of the latter. Raises InputError."""
+        beams = read_beams(scan, nan_is_free=self._entry.nan_is_free)
+        used = beams.met & self._within(beams.points)
+        layout = len(beams.met), scan.angle_min, scan.angle_increment, scan.header.frame_id
+        held = self._memory.stays(beams, layout, frame, used)
+        return np.concatenate([beams.points[used], held]), int(np.count_nonzero(beams.failed))
+
+    def _cloud(self, cloud: Any) -> tuple[Floats, int]:
+        """Return the points of a PointCloud2 and the number of those without a place. Raises InputError."""
+        points, lost = read_cloud_points(cloud)
+        if lost and not len(points) and not self._entry.nan_is_free:
+            raise InputError(f"points: expected finite ones, got none of {lost}; what was there stays")
+        return points[self._within(points)], lost
+
+    def _within(self, points: Floats) -> NDArray[np.bool_]:
+        """Which points (N,) are within the entry's range of the sensor."""
+        with np.errstate(over="ignore"):
+            squared = (points**2).sum(1)
+        return np.asarray((squared >= self._entry.min_range**2) & (squared <= self._entry.max_range**2))
 
     def _on_robot(self, cloud: Points, at: Pose, stamp_ns: int, scene: SourceScene) -> NDArray[np.bool_]:
         """Which points (N,) are on an object that is left out. Raises InputError if it is not known where one is."""
@@ -95,19 +112,6 @@ class CloudSource:
                 on |= points_within(cloud, at, description.shapes, pose, limit)
         return on
 
-    def settle(self, now_ns: int, scene: SourceScene) -> None:
-        """See Source."""
-
-
-def scan_points(scan: Any) -> tuple[Floats, int]:
-    """Return the points (N, 3) in m of a LaserScan in its frame, and the number of NaN; beams may meet nothing."""
-    ranges = np.asarray(scan.ranges, np.float64)
-    angles = scan.angle_min + scan.angle_increment * np.arange(len(ranges))
-    met = (ranges >= scan.range_min) & (ranges <= scan.range_max) & np.isfinite(angles)
-    distance, angle = ranges[met], angles[met]
-    points = np.column_stack([distance * np.cos(angle), distance * np.sin(angle), np.zeros(len(distance))])
-    return points, int(np.count_nonzero(np.isnan(ranges)))
-
 
 def read_cloud_points(cloud: Any) -> tuple[Floats, int]:
     """Return the finite points (N, 3) in m of a PointCloud2 in its frame, and the number of the others.
@@ -117,30 +121,33 @@ def read_cloud_points(cloud: Any) -> tuple[Floats, int]:
     fields = {each.name: each for each in cloud.fields}
     missing = [name for name in "xyz" if name not in fields or fields[name].datatype not in _FORMATS]
     if missing:
-        there = ", ".join(f"{each.name} ({each.datatype})" for each in cloud.fields) or "none"
+        there = ", ".join(f"{each.name:.20} ({each.datatype})" for each in cloud.fields[:20]) or "none"
         raise InputError(f"fields: expected x, y and z of FLOAT32 (7) or FLOAT64 (8), got {there}")
-    count = cloud.width * cloud.height
+    count = int(cloud.width) * int(cloud.height)
     if count > MOST_POINTS:
         raise InputError(f"expected at most {MOST_POINTS} points, got {count}")
+    if count == 0:
+        return np.zeros((0, 3)), 0
     data = np.asarray(cloud.data, np.uint8)
-    least = cloud.width * cloud.point_step
-    if cloud.row_step < least or len(data) < cloud.height * cloud.row_step:
+    least = int(cloud.width) * int(cloud.point_step)
+    if cloud.row_step < least or len(data) < int(cloud.height) * int(cloud.row_step):
         raise InputError(
             f"data: expected {cloud.height} rows of {least} bytes, got row_step {cloud.row_step} and {len(data)} bytes"
         )
     order = ">" if cloud.is_bigendian else "<"
-    formats = [order + _FORMATS[fields[name].datatype] for name in "xyz"]
-    try:
-        dtype = np.dtype(
-            {
-                "names": ["x", "y", "z"],
-                "formats": formats,
-                "offsets": [fields[name].offset for name in "xyz"],
-                "itemsize": cloud.point_step,
-            }
-        )
-    except ValueError as error:
-        raise InputError(f"fields: expected offsets within point_step {cloud.point_step}: {error}") from None
+    formats, offsets = [], []
+    for name in "xyz":  # before NumPy sees them: it believes any offset
+        kind, size = _FORMATS[fields[name].datatype]
+        if not 0 <= fields[name].offset <= cloud.point_step - size:
+            raise InputError(
+                f"fields: expected {name} within point_step {cloud.point_step}, got {size} bytes "
+                f"at offset {fields[name].offset}"
+            )
+        formats.append(order + kind)
+        offsets.append(int(fields[name].offset))
+    dtype = np.dtype(
+        {"names": ["x", "y", "z"], "formats": formats, "offsets": offsets, "itemsize": int(cloud.point_step)}
+    )
     rows = data[: cloud.height * cloud.row_step].reshape(cloud.height, cloud.row_step)[:, :least]
     raw = np.ascontiguousarray(rows).reshape(-1).view(dtype)
     points = np.empty((count, 3))

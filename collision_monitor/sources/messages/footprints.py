@@ -14,30 +14,37 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.errors import CollisionMonitorError, InputError
+from collision_monitor.errors import CollisionMonitorError, InputError, ShapeError
 from collision_monitor.records import StateFlag
 from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
-from collision_monitor.sources.ground.prisms import prism
+from collision_monitor.sources.ground.prisms import covering_prism, load_prisms
 from collision_monitor.sources.ground.scene_states import carry_states, empty_states
+from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
+from collision_monitor.tolerances import LARGEST_INPUT
 
 FOOTPRINT: Final = "geometry_msgs/msg/PolygonStamped"
+
+MOST_FOOTPRINT_POINTS: Final = 10_000
+"""Corners of a message. Of more than `prisms.MOST_CORNERS`, the convex hull is monitored."""
 
 Floats = NDArray[np.float64]
 
 
-class FootprintSource:
+class FootprintSource(Source):
     """The object of one entry: a prism of the entry's `height` over the footprint, or a polygon of a plane scene."""
 
     def __init__(self, entry: ObjectEntry, message_type: str, mapping: Mapping) -> None:
         entry.allow_only(("height", "shape_tolerance", "position_stddev", "estimate_over"), message_type)
         if entry.shapes:
             raise InputError(f"{entry.name}, shape: {message_type} brings its own; `height` makes it a prism")
-        self.topics = {entry.topic: (message_type,)}
+        self.name, self.topics = entry.name, {entry.topic: (message_type,)}
         self._entry = entry
         self._corners: Floats | None = None  # (n, 2), in the object's frame
+        load_prisms()
+        self._coarse = ""  # why it is not the footprint itself that is described
 
     def begin(self, scene: SourceScene) -> None:
         """See Source. The first footprint describes the object."""
@@ -49,13 +56,16 @@ class FootprintSource:
         frame = scene.locate(entry.name, frame_name(content.header.frame_id), stamp_ns)
         if frame is None:
             return
-        points = np.array([(p.x, p.y, p.z) for p in content.polygon.points], np.float64).reshape(-1, 3)
-        if len(points) < 3 or not np.isfinite(points).all():
-            scene.refuse(entry.name, f"footprint: expected at least 3 finite corners, got {len(points)}")
-            return
-        middle, turn = points.mean(0), 0.0
+        given = content.polygon.points
+        if len(given) > MOST_FOOTPRINT_POINTS:
+            raise ShapeError(f"footprint: expected at most {MOST_FOOTPRINT_POINTS} corners, got {len(given)}")
+        points = np.array([(p.x, p.y, p.z) for p in given], np.float64).reshape(-1, 3)
+        usable = (np.abs(points) <= LARGEST_INPUT).all(1)
+        if not usable.any():
+            raise ShapeError(f"footprint: expected at least 3 finite corners, got {int(usable.sum())}")
+        middle, turn = points[usable].mean(0), 0.0
         centred = points[:, :2] - middle[:2]
-        if self._corners is not None and len(self._corners) == len(centred):
+        if self._corners is not None and len(self._corners) == len(centred) and usable.all():
             turn = _turn(self._corners, centred)
             centred = _turned(centred, -turn)
         if not self._describe(centred, scene):
@@ -66,28 +76,29 @@ class FootprintSource:
         states["position_stddev"] = entry.position_stddev
         if frame is not IDENTITY:
             carry_states(states, frame, None)
-        scene.observe(states, stamp_ns, window=entry.estimate_over)
-
-    def settle(self, now_ns: int, scene: SourceScene) -> None:
-        """See Source."""
+        scene.observe(entry.name, states, stamp_ns, window=entry.estimate_over)
 
     def _describe(self, corners: Floats, scene: SourceScene) -> bool:
+        """Describe the object if its footprint has changed; return whether it is described."""
         entry, known = self._entry, self._corners
         same = known is not None and known.shape == corners.shape
-        if known is not None and same and float(np.abs(known - corners).max()) <= entry.shape_tolerance:
-            return True
-        try:
-            shapes = prism(corners, 0.0, entry.height)
-            scene.describe(entry.describe(shapes=shapes, extra_padding=entry.shape_tolerance))
-        except CollisionMonitorError as error:
-            scene.refuse(entry.name, str(error))
-            return False
-        self._corners = corners
+        if known is None or not same or not float(np.abs(known - corners).max()) <= entry.shape_tolerance:
+            try:
+                shapes, self._coarse = covering_prism(corners, 0.0, entry.height)
+                scene.describe(entry.describe(shapes=shapes, extra_padding=entry.shape_tolerance))
+            except CollisionMonitorError as error:
+                scene.refuse(entry.name, str(error))
+                return known is not None  # what it was last stays, where it is now
+            self._corners = corners
+        if self._coarse:
+            scene.refuse(entry.name, self._coarse)
         return True
 
 
 def _turn(corners: Floats, others: Floats) -> float:
-    """Return the rotation (rad) that best takes centred corners (n, 2) to others."""
+    """Return the rotation (rad) that best takes centred corners (n, 2) to others; 0 if they are not all finite."""
+    if not np.isfinite(corners).all():
+        return 0.0
     sine = (corners[:, 0] * others[:, 1] - corners[:, 1] * others[:, 0]).sum()
     return math.atan2(sine, (corners * others).sum())
 

@@ -20,6 +20,7 @@ from collision_monitor.sources.ground.scene_states import (
     turn_twists,
     turned_triangles,
 )
+from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.ground.yaml_table import SHAPES
 
@@ -28,17 +29,14 @@ POSE: Final = "geometry_msgs/msg/PoseStamped"
 POSE_WITH_COVARIANCE: Final = "geometry_msgs/msg/PoseWithCovarianceStamped"
 
 
-class PoseSource:
+class PoseSource(Source):
     """The object of one entry. Odometry holds its twist along the axes of `child_frame_id`, which is the body's."""
 
     def __init__(self, entry: ObjectEntry, message_type: str, mapping: Mapping) -> None:
         entry.allow_only(("covariance", "position_stddev", "estimate_over"), message_type)
         require_shape(entry)
-        self.topics = {entry.topic: (message_type,)}
+        self.name, self.topics = entry.name, {entry.topic: (message_type,)}
         self._entry = entry
-
-    def begin(self, scene: SourceScene) -> None:
-        """See Source. The feed describes entries with a shape."""
 
     def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
         """See Source."""
@@ -79,10 +77,9 @@ class PoseSource:
             given = None
         if frame is not IDENTITY:
             given = carry_states(states, frame, given)
-        scene.observe(states, stamp_ns, given, window=entry.estimate_over)
-
-    def settle(self, now_ns: int, scene: SourceScene) -> None:
-        """See Source."""
+        scene.observe(
+            entry.name, states, stamp_ns, given, window=entry.estimate_over, turns=twist is not None
+        )
 
     def _blocks(self, part: Any, what: str, scene: SourceScene) -> Blocks:
         found = usable_blocks(np.asarray(part.covariance, np.float64).reshape(1, 36))

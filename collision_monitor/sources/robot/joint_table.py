@@ -17,6 +17,9 @@ NANOSECOND: Final = 1e-9
 
 _SHOWN: Final = 5
 
+MOST_NAMES: Final = 10_000
+"""Joints of a message. A humanoid has 60."""
+
 _MOST_LAYOUTS: Final = 32
 """Different lists of names that are remembered. Each publisher of a robot has one."""
 
@@ -25,8 +28,8 @@ class JointTable:
     """Joints by the columns of a tree. fresh (J,): whether a joint has news that `at` has not returned yet.
 
     Several publishers may share a topic, each with its own joints. A message without velocities, as some drivers send,
-    leaves them to the difference of two positions. max_age: s up to which a position may be old; a message that is
-    older than the last one by more begins a new time, and one by less is late and ignored.
+    leaves them to the difference of two positions. max_age: s up to which a position may be old. A message that is
+    older than the last one is late and ignored, until `restart`.
     """
 
     def __init__(self, tree: KinematicTree, max_age: float) -> None:
@@ -43,6 +46,8 @@ class JointTable:
 
     def take(self, message: Any, stamp_ns: int) -> str | None:
         """Store the joints of a JointState. Return the reason if it, or a part of it, cannot be used."""
+        if len(message.name) > MOST_NAMES:
+            return f"expected at most {MOST_NAMES} joints in a message, got {len(message.name)}"
         names = tuple(message.name)
         position, velocity = np.asarray(message.position), np.asarray(message.velocity)
         if len(position) != len(names) or len(velocity) not in (0, len(names)):
@@ -52,8 +57,8 @@ class JointTable:
             )
         places, columns = self._layout(names)
         given = position[places]
-        late = self._stamps[columns] - stamp_ns
-        usable = (np.abs(given) <= LARGEST_INPUT) & ~(self._seen[columns] & (late > 0) & (late <= self._max_age))
+        late = self._seen[columns] & (self._stamps[columns] > stamp_ns)
+        usable = (np.abs(given) <= LARGEST_INPUT) & ~late
         if not usable.all():
             places, columns, given = places[usable], columns[usable], given[usable]
         if len(velocity):
@@ -68,6 +73,10 @@ class JointTable:
         self._seen[columns] = self.fresh[columns] = True
         bad = [names[k] for k in np.flatnonzero(~(np.abs(position) <= LARGEST_INPUT))[:_SHOWN]]
         return f"expected finite positions, got others for {', '.join(bad):.200}" if bad else None
+
+    def restart(self) -> None:
+        """Forget all earlier times."""
+        self._seen[:] = self.fresh[:] = False
 
     def at(self, now_ns: int) -> tuple[Floats, Mask, Mask]:
         """Return positions and velocities (J, 2) at a time, and whether positions (J,) and velocities (J,) are known.

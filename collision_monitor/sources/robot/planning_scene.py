@@ -6,23 +6,26 @@ nothing in the monitor. Octomaps and fixed_frame_transforms are not read.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
-from collision_monitor.errors import CollisionMonitorError
+from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.sources.ground.frames import FrameMotion, MissingFrame
+from collision_monitor.sources.ground.frames import MissingFrame
 from collision_monitor.sources.ground.mapping import Mapping as SourcesFile
 from collision_monitor.sources.ground.object_entry import ObjectEntry
+from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.robot.carried_bodies import Body
 from collision_monitor.sources.robot.collision_objects import (
+    APPEND,
     REMOVE,
     CollisionObject,
     Parts,
     collision_object,
+    has_pose,
     operation_of,
 )
 from collision_monitor.sources.robot.link_rules import LinkRules
@@ -70,8 +73,13 @@ class HeldObject:
     offset: Pose | None = None
 
 
-class PlanningSceneSource:
-    """The planning scene of one robot, or of none. describe: makes the descriptions of the world's objects."""
+class PlanningSceneSource(Source):
+    """The planning scene of one robot, or of none. describe: makes the descriptions of the world's objects.
+
+    Objects of the world and attached ones are two name spaces, as in MoveIt: both may have one name.
+    """
+
+    speaks = False
 
     def __init__(
         self, name: str, topics: Mapping[str, tuple[str, ...]], describe: Describe, robot: RobotSource | None
@@ -83,12 +91,9 @@ class PlanningSceneSource:
         self._world: dict[str, WorldObject] = {}
         self._held: dict[str, HeldObject] = {}
         self._rules = PlanningRules(name)
-        self._ids: dict[str, int] = {}
+        self._ids: dict[tuple[str, int], int] = {}
         self._is_changed = False
         self._waits = False  # whether an object is not placed yet
-
-    def begin(self, scene: SourceScene) -> None:
-        """See Source. The messages bring all objects."""
 
     def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
         """See Source."""
@@ -105,104 +110,161 @@ class PlanningSceneSource:
     # -- messages
 
     def _take_scene(self, content: Any, stamp_ns: int, scene: SourceScene) -> None:
+        """Take a PlanningScene: first what is attached, which may come from the world as it was, then the world."""
         objects = content.world.collision_objects
+        named = {str(each.id) for each in objects}
         if not content.is_diff:
-            for name in sorted(self._world.keys() - {each.id for each in objects}):
+            for name in sorted(self._held.keys() - {str(each.object.id) for each in _attached(content)}):
+                if self._robot is not None and not content.robot_state.is_diff:
+                    self._remove(self._held.pop(name).object_id, name, scene)
+        self._take_attached(content, stamp_ns, scene, stays=named if not content.is_diff else ())
+        if not content.is_diff:
+            for name in sorted(self._world.keys() - named):
                 self._drop(name, scene)
+        self._is_changed |= self._rules.take(content, scene)
         for each in objects:
             self._change_world(each, scene)
-        if len(content.world.octomap.octomap.data):
-            scene.refuse(self.name, "the octomap of the planning scene is not monitored; give its points as a topic")
-        self._is_changed |= self._rules.take(content, scene)
-        attached = content.robot_state.attached_collision_objects
+        self._note_octomap(content, scene)
+
+    def _take_attached(self, content: Any, stamp_ns: int, scene: SourceScene, stays: Iterable[str]) -> None:
+        attached = _attached(content)
         if self._robot is None:
             if attached:
-                scene.refuse(self.name, "expected attached objects in the planning scene of an entry of `robots:`")
+                text = "expected attached objects in the planning scene of an entry of `robots:`"
+                scene.refuse(self.name, text)
+                scene.lacks(self.name, f"{self.name}: attached objects", text)
             return
-        if not (content.is_diff or content.robot_state.is_diff):
-            for name in sorted(self._held.keys() - {each.object.id for each in attached}):
-                scene.remove(self._held.pop(name).object_id)
-                self._is_changed = True
         for each in attached:
-            self._change_held(each, stamp_ns, scene)
+            name = str(each.object.id)
+            with scene.guard(self.name, name):
+                self._change_held(each, name, stamp_ns, scene, leaves_world=name in stays)
+
+    def _note_octomap(self, content: Any, scene: SourceScene) -> None:
+        what = f"{self.name}: octomap"
+        if len(content.world.octomap.octomap.data):
+            text = "the octomap of the planning scene is not monitored; give its points as a topic"
+            scene.refuse(self.name, text)
+            scene.lacks(self.name, what, text)
+        elif not content.is_diff:
+            scene.has(self.name, what)
 
     def _change_world(self, message: Any, scene: SourceScene) -> None:
         name = str(message.id)
         known = self._world.get(name)
-        try:
+        with scene.guard(self.name, name):
             if operation_of(message) == REMOVE:
                 for each in [name] if name else list(self._world):
                     self._drop(each, scene)
                 return
             content = collision_object(message, known.content if known else None)
-        except CollisionMonitorError as error:
-            scene.refuse(self.name, f"{name:.80}: {error}")
+            if known is None and len(self._world) >= MOST_OBJECTS:
+                raise InputError(f"expected at most {MOST_OBJECTS} objects in the planning scene")
+            if known is None or known.content.fingerprint != content.fingerprint:
+                held = self._held.get(name)
+                taken = None if held is None else held.object_id
+                object_id = known.object_id if known is not None else self._id(name, taken, scene)
+                self._world[name] = WorldObject(object_id, content)
+                self._is_changed = True
             return
-        if known is None and len(self._world) >= MOST_OBJECTS:
-            scene.refuse(self.name, f"expected at most {MOST_OBJECTS} objects in the planning scene")
-            return
-        if known is None or known.content.fingerprint != content.fingerprint:
-            self._world[name] = WorldObject(self._id(name, scene), content)
-            self._is_changed = True
+        if known is None:
+            scene.lacks(self.name, f"{self.name}/{name}", scene.last_refusal[self.name])
 
     def _drop(self, name: str, scene: SourceScene) -> None:
+        """Remove an object of the world, and what the matrix says about it."""
         gone = self._world.pop(name, None)
         if gone is not None:
-            scene.remove(gone.object_id)
-            self._is_changed = True
+            self._remove(gone.object_id, name, scene)
+        scene.has(self.name, f"{self.name}/{name}")
+        if name not in self._held:
+            self._rules.forget(name)
 
-    def _change_held(self, message: Any, stamp_ns: int, scene: SourceScene) -> None:
-        """Attach or detach an object. A detached one stays in the world where it is, as in MoveIt."""
-        name, link = str(message.object.id), str(message.link_name)
-        try:
-            if operation_of(message.object) == REMOVE:
-                for each in [name] if name else [k for k, held in self._held.items() if link in ("", held.link)]:
-                    self._let_go(each, stamp_ns, scene)
+    def _remove(self, object_id: int, name: str, scene: SourceScene) -> None:
+        scene.remove(object_id)
+        scene.has(self.name, f"{self.name}/{name}")
+        self._is_changed = True
+
+    def _change_held(
+        self, message: Any, name: str, stamp_ns: int, scene: SourceScene, *, leaves_world: bool
+    ) -> None:
+        """Attach or detach an object. leaves_world: whether the world keeps an object of that name, if it has one.
+
+        Source: MoveIt, planning_scene.cpp, processAttachedCollisionObjectMsg. Raises InputError, ShapeError, PoseError.
+        """
+        link, operation = str(message.link_name), operation_of(message.object)
+        if operation == REMOVE:
+            at_link = [each for each, held in self._held.items() if link in ("", held.link)]
+            if name in self._held and name not in at_link:
+                raise InputError(f"expected it at the link {self._held[name].link}, got {link!r:.80}")
+            for each in [name] if name else at_link:
+                self._let_go(each, stamp_ns, scene)
+            return
+        solids = message.object.primitives, message.object.meshes, message.object.planes
+        known, held = self._world.get(name), self._held.get(name)
+        offset, touch = None, frozenset(map(str, message.touch_links))
+        if not any(map(len, solids)) and known is not None:  # an object of the world is picked up
+            content = known.content
+        elif operation == APPEND and held is not None:
+            content = collision_object(message.object, held.content)
+            touch |= held.touch
+            if not has_pose(message.object.pose):
+                offset = held.offset
+        else:
+            content = collision_object(message.object, held.content if held else None)
+        if held is not None and held.content.fingerprint == content.fingerprint:
+            if (held.link, held.touch) == (link, touch):
                 return
-            solids = message.object.primitives, message.object.meshes, message.object.planes
-            known = self._world.get(name)
-            held = self._held.get(name)
-            if not any(map(len, solids)) and known is not None:  # an object of the world is picked up
-                content = known.content
-            else:
-                content = collision_object(message.object, held.content if held else None)
-        except CollisionMonitorError as error:
-            scene.refuse(self.name, f"{name:.80}: {error}")
-            return
-        touch = frozenset(map(str, message.touch_links))
-        same = held is not None and held.content.fingerprint == content.fingerprint
-        if held is not None and same and (held.link, held.touch) == (link, touch):
-            return
-        self._world.pop(name, None)
-        self._held[name] = HeldObject(self._id(name, scene), content, link, touch)
+            if operation == APPEND:
+                offset = held.offset
+        stays = self._world.get(name) if leaves_world else None
+        taken = None if stays is None else stays.object_id
+        object_id = held.object_id if held is not None else self._id(name, taken, scene)
+        if known is not None and not leaves_world:
+            del self._world[name]
+            if known.object_id != object_id:
+                scene.remove(known.object_id)
+        self._held[name] = HeldObject(object_id, content, link, touch, offset)
         self._is_changed = True
 
     def _let_go(self, name: str, stamp_ns: int, scene: SourceScene) -> None:
+        """Detach an object. It stays in the world where it is, unless the world has another one of its name."""
         held = self._held.pop(name, None)
         if held is None or self._robot is None:
             return
         self._is_changed = True
-        link = self._robot.link_motion(held.link, stamp_ns, scene)
-        if link is None or held.offset is None:
-            scene.refuse(self.name, f"{name:.80}: it was detached while the pose of {held.link} was not known")
-            scene.remove(held.object_id)
+        with scene.guard(self.name, name):
+            if name in self._world:
+                scene.remove(held.object_id)
+                scene.refuse(self.name, f"{name:.80}: it was detached, and the world has another object of its name")
+                return
+            link = self._robot.link_motion(held.link, stamp_ns, scene)
+            if link is None or held.offset is None:
+                scene.remove(held.object_id)
+                raise InputError(f"it was detached while the pose of {held.link:.80} was not known")
+            try:
+                at = Pose(link.position, link.quaternion) @ held.offset
+            except CollisionMonitorError:
+                scene.remove(held.object_id)
+                raise
+            self._world[name] = WorldObject(
+                held.object_id, CollisionObject(name, held.content.shapes, scene.frame, at)
+            )
             return
-        try:
-            at = Pose(link.position, link.quaternion) @ held.offset
-        except CollisionMonitorError as error:
-            scene.refuse(self.name, f"{name:.80}: {error}")
-            scene.remove(held.object_id)
-            return
-        content = CollisionObject(name, held.content.shapes, scene.frame, at)
-        self._world[name] = WorldObject(held.object_id, content)
+        scene.lacks(self.name, f"{self.name}/{name}", scene.last_refusal[self.name])
 
-    def _id(self, name: str, scene: SourceScene) -> int:
-        """Return the id of an object, which it keeps when it is attached or comes again."""
-        if name not in self._ids:
-            if len(self._ids) >= 2 * MOST_OBJECTS:
-                self._ids = {each: i for each, i in self._ids.items() if each in self._world or each in self._held}
-            self._ids[name] = scene.new_id()
-        return self._ids[name]
+    def _id(self, name: str, taken: int | None, scene: SourceScene) -> int:
+        """Return the id of an object, which it keeps when it is attached or comes again.
+
+        taken: that of the object of the same name in the other name space.
+        """
+        if len(self._ids) >= 2 * MOST_OBJECTS:
+            used = {it.object_id for it in self._world.values()} | {it.object_id for it in self._held.values()}
+            self._ids = {key: i for key, i in self._ids.items() if i in used}
+        for key in ((name, 0), (name, 1)):
+            if key not in self._ids:
+                self._ids[key] = scene.new_id()
+            if self._ids[key] != taken:
+                break
+        return self._ids[key]
 
     # -- the scene
 
@@ -211,7 +273,7 @@ class PlanningSceneSource:
         if not (is_new or self._waits or self._is_changed):
             return
         for name, it in self._world.items():
-            if it.at is None:
+            if it.at is None and scene.may_describe:
                 self._place_in_world(name, it, now_ns, scene, is_new)
         robot = self._robot
         self._waits = any(it.at is None for it in self._world.values())
@@ -219,10 +281,8 @@ class PlanningSceneSource:
             return
         for name, held in self._held.items():
             if held.offset is None:
-                try:
+                with scene.guard(self.name, name):
                     held.offset = self._offset(name, held, now_ns, scene, is_new)
-                except CollisionMonitorError as error:
-                    scene.refuse(self.name, f"{name:.80}: {error}")
                 self._is_changed |= held.offset is not None
                 self._waits |= held.offset is None
         if self._is_changed:
@@ -232,43 +292,63 @@ class PlanningSceneSource:
                 for name, it in self._held.items()
                 if it.offset is not None
             }
-            robot.carry(bodies, self._carried_rules(robot.link_ids), scene)
+            robot.carry(bodies, self._carried_rules(robot, scene), scene)
 
     def _place_in_world(self, name: str, it: WorldObject, now_ns: int, scene: SourceScene, is_new: bool) -> None:
+        what = f"{self.name}/{name}"
         frame = scene.frames.motion(scene.frame, it.content.frame or scene.frame, now_ns)
         if isinstance(frame, MissingFrame):
             if is_new:
                 scene.refuse(self.name, f"{name:.80}: {frame}")
+            scene.lacks(self.name, what, str(frame))
             return
-        try:
+        with scene.guard(self.name, name):
             it.at = Pose(frame.position, frame.quaternion) @ it.content.pose
-            scene.describe(self._describe(it.object_id, f"{self.name}/{name}", it.content.shapes, it.at))
-        except CollisionMonitorError as error:
-            scene.refuse(self.name, f"{name:.80}: {error}")
+            scene.describe(self._describe(it.object_id, what, it.content.shapes, it.at))
+            scene.has(self.name, what)
+            return
+        if it.at is None:  # the place is too far away: it does not come nearer
+            it.at = Pose()
+        if not scene.is_described(it.object_id):
+            scene.lacks(self.name, what, scene.last_refusal[self.name])
 
     def _offset(self, name: str, held: HeldObject, now_ns: int, scene: SourceScene, is_new: bool) -> Pose | None:
         """Return the pose of an attached object in the frame of its link; None, after a refusal, if it is not known."""
         robot, frame = self._robot, held.content.frame
         assert robot is not None and robot.robot is not None
+        what, reason = f"{self.name}/{name}", ""
+        link = other = None
         if held.link not in robot.robot.tree.links:
-            if is_new:
-                scene.refuse(self.name, f"{name:.80}: expected it at a link of {robot.name}, got {held.link!r:.80}")
-            return None
-        if frame == held.link:
+            reason = f"expected it at a link of {robot.name}, got {held.link!r:.80}"
+        elif frame == held.link:
+            scene.has(self.name, what)
             return held.content.pose
-        link = robot.link_motion(held.link, now_ns, scene)
-        other: FrameMotion | MissingFrame | None = robot.link_motion(frame, now_ns, scene)
-        if other is None:
-            other = scene.frames.motion(scene.frame, frame or scene.frame, now_ns)
-        if link is None or isinstance(other, MissingFrame):
+        else:
+            link = robot.link_motion(held.link, now_ns, scene)
+            other = robot.link_motion(frame, now_ns, scene)
+            if other is None:
+                found = scene.frames.motion(scene.frame, frame or scene.frame, now_ns)
+                other, reason = (None, str(found)) if isinstance(found, MissingFrame) else (found, "")
+            if link is None:
+                reason = f"the pose of {held.link:.80} is not known"
+        if link is None or other is None:
             if is_new:
-                scene.refuse(self.name, f"{name:.80}: {other if link else f'the pose of {held.link} is not known'}")
+                scene.refuse(self.name, f"{name:.80}: {reason}")
+            scene.lacks(self.name, what, reason)
             return None
         between = link.inverse() @ other
+        scene.has(self.name, what)
         return Pose(between.position, between.quaternion) @ held.content.pose
 
-    def _carried_rules(self, links: dict[str, int]) -> LinkRules:
+    def _carried_rules(self, robot: RobotSource, scene: SourceScene) -> LinkRules:
         """Return what the scene states about the links of the robot and the attached objects."""
-        ids = {name: it.object_id for name, it in self._world.items()}
-        ids |= {name: held.object_id for name, held in self._held.items()} | links
-        return self._rules.of(links, self._held, ids)
+        ids = [(name, it.object_id) for name, it in self._world.items()]
+        ids += [(name, held.object_id) for name, held in self._held.items()]
+        ids += robot.link_ids.items()
+        with scene.guard(self.name):
+            return self._rules.of(robot.link_ids, self._held, ids, robot.disabled)
+        return LinkRules()
+
+
+def _attached(content: Any) -> Any:
+    return content.robot_state.attached_collision_objects

@@ -15,7 +15,7 @@ from collision_monitor.sources.ground.frames import IDENTITY, FrameMotion, frame
 from collision_monitor.sources.ground.scene_states import empty_states, turn_twists
 from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.messages.poses import ODOMETRY, put_pose, worst_stddev
-from collision_monitor.sources.messages.tf_objects import TRANSFORMS, header_of
+from collision_monitor.sources.messages.transform_arrays import TRANSFORMS
 from collision_monitor.sources.robot.robot_entry import RobotEntry
 from collision_monitor.tolerances import LARGEST_INPUT
 
@@ -49,8 +49,11 @@ class RobotBase(Protocol):
     def take(self, content: Any, stamp_ns: int, robot: Robot, scene: SourceScene) -> None:
         """Process a decoded message."""
 
-    def moved_by(self, content: Any, robot: Robot, scene: SourceScene) -> Any:
-        """Return the header of the transform in a TFMessage that moves the base; None if there is none."""
+    def moved_by(self, robot: Robot, scene: SourceScene) -> str | None:
+        """Return the frame whose transforms move the base; None if there is none."""
+
+    def restart(self) -> None:
+        """Forget all earlier times."""
 
     def motion(self, now_ns: int, robot: Robot, scene: SourceScene) -> BaseMotion | None:
         """Return the motion of the base link; None, after a refusal, if it is not known."""
@@ -77,7 +80,11 @@ class FixedBase:
     def take(self, content: Any, stamp_ns: int, robot: Robot, scene: SourceScene) -> None:
         """See RobotBase."""
 
-    def moved_by(self, content: Any, robot: Robot, scene: SourceScene) -> Any:
+    def moved_by(self, robot: Robot, scene: SourceScene) -> str | None:
+        """See RobotBase."""
+        return None
+
+    def restart(self) -> None:
         """See RobotBase."""
 
     def motion(self, now_ns: int, robot: Robot, scene: SourceScene) -> BaseMotion:
@@ -98,17 +105,22 @@ class FrameBase:
         """See RobotBase. The feed has put the transforms into the tree."""
         self.fresh = True
 
-    def moved_by(self, content: Any, robot: Robot, scene: SourceScene) -> Any:
+    def moved_by(self, robot: Robot, scene: SourceScene) -> str | None:
         """See RobotBase."""
-        return header_of(content, scene.frames.nearest_moving(self._frame(robot)))
+        return scene.frames.nearest_moving(self.frame(robot))
 
-    def _frame(self, robot: Robot) -> str:
+    def restart(self) -> None:
+        """See RobotBase."""
+        self.fresh = True
+
+    def frame(self, robot: Robot) -> str:
+        """Return the frame of tf that the base is at."""
         return self._entry.base.frame or self._entry.base.link or robot.tree.links[0]
 
     def motion(self, now_ns: int, robot: Robot, scene: SourceScene) -> BaseMotion | None:
         """See RobotBase."""
         name, base = self._entry.name, self._entry.base
-        frame = self._frame(robot)
+        frame = self.frame(robot)
         found = scene.locate(name, frame, now_ns)
         link = base.link or (frame if frame in robot.tree.links else robot.tree.links[0])
         back = _base_in_link(robot, link, f"{name}, base", scene)
@@ -152,13 +164,18 @@ class OdometryBase:
         state = states[0]
         moved = FrameMotion(state["position"], state["quaternion"], state["linear"], state["angular"], moving=True)
         base = BaseMotion(frame @ moved @ back, _stddev(content, name, scene))
-        if not _is_near(base, name, scene):
-            return
+        if not _is_near(base, name, scene) or (self._last is not None and stamp_ns < self._stamp):
+            return  # late, if it is before the last one: a time that goes back begins with `restart`
         self._last = base
         self._stamp, self.fresh = stamp_ns, True
 
-    def moved_by(self, content: Any, robot: Robot, scene: SourceScene) -> Any:
+    def moved_by(self, robot: Robot, scene: SourceScene) -> str | None:
         """See RobotBase."""
+        return None
+
+    def restart(self) -> None:
+        """See RobotBase."""
+        self._last, self.fresh = None, False
 
     def motion(self, now_ns: int, robot: Robot, scene: SourceScene) -> BaseMotion | None:
         """See RobotBase. The base moves on at its twist since the message."""

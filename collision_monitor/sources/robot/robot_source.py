@@ -9,21 +9,23 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.errors import CollisionMonitorError, InputError, PoseError
+from collision_monitor.errors import InputError, PoseError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
 from collision_monitor.robots import link_motions
-from collision_monitor.robots.robot import Description, Robot, make_robot
+from collision_monitor.robots.robot import Description, Robot, make_robot, takes_long
+from collision_monitor.robots.srdf import Pair
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.sources.ground.frames import FrameMotion
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.solid_shapes import scaled_shape
+from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.robot.carried_bodies import Body, CarriedBodies
-from collision_monitor.sources.robot.collision_objects import pose_bytes, shape_bytes
+from collision_monitor.sources.robot.collision_objects import pose_bytes, shape_digest
 from collision_monitor.sources.robot.joint_table import JointTable
 from collision_monitor.sources.robot.link_rules import LinkRules, allowed_contacts
-from collision_monitor.sources.robot.robot_base import BaseMotion, FixedBase, at_links, robot_base
+from collision_monitor.sources.robot.robot_base import BaseMotion, FixedBase, FrameBase, at_links, robot_base
 from collision_monitor.sources.robot.robot_entry import RobotEntry
 
 Floats = NDArray[np.float64]
@@ -31,13 +33,21 @@ Floats = NDArray[np.float64]
 JOINT_STATE: Final = "sensor_msgs/msg/JointState"
 TEXT: Final = "std_msgs/msg/String"
 
+MOST_UNKNOWN_JOINTS: Final = 1000
+"""Joints that no robot of the file has, each of which is refused once."""
+
+MOST_DIGESTS: Final = 10_000
+"""Bodies whose shapes are known by a digest."""
+
 _SHOWN: Final = 8
 
 _STDDEVS: Final = ("position_stddev", "orientation_stddev", "velocity_stddev", "angular_velocity_stddev")
 
 
-class RobotSource:
+class RobotSource(Source):
     """The links of one robot. fleet: all robots of the file, to which the joints of a shared topic may belong."""
+
+    speaks = False  # its URDF comes once; joints that are silent are listed by `settle`
 
     def __init__(self, entry: RobotEntry, mapping: Mapping, fleet: list[RobotSource]) -> None:
         self.name = entry.name
@@ -53,6 +63,9 @@ class RobotSource:
         self._ids: dict[str, int] = {}
         self._rules = LinkRules()
         self._described: dict[int, Any] = {}
+        self._digests: dict[int, tuple[Any, bytes]] = {}  # of the shapes of the bodies, by their addresses
+        self._is_prepared = True  # False while a robot is made beside the monitoring
+        self._is_behind = False  # whether bodies wait for their descriptions
         self._place: tuple[float, ...] | None = None  # of a base at rest
         self._standing: dict[int, Pose] = {}  # poses of the links that are rigid with it
         self._moving = CarriedBodies((), ())
@@ -82,7 +95,8 @@ class RobotSource:
         if topic in (self._entry.urdf_topic, self._entry.srdf_topic):
             self._take_text(topic, content.data, scene)
         elif self.robot is None:
-            scene.refuse(self.name, f"a message of {topic} came before its URDF on {self._entry.urdf_topic}")
+            text = f"a message of {topic} came before its URDF on {self._entry.urdf_topic}"
+            scene.refuse(self.name, text if self._is_prepared else f"{text} was ready")
         elif topic in self._base.topics:
             self._base.take(content, stamp_ns, self.robot, scene)
         else:
@@ -90,12 +104,28 @@ class RobotSource:
             if (reason := self._joints.take(content, stamp_ns)) is not None:
                 scene.refuse(self.name, f"{topic}: {reason}")
 
-    def moved_by(self, content: Any, scene: SourceScene) -> Any:
-        """Return the header of the transform in a TFMessage that moves the base; None if there is none."""
-        return None if self.robot is None else self._base.moved_by(content, self.robot, scene)
+    @property
+    def frame(self) -> str:
+        """The frame of tf that the base is at; empty if there is none, or if it is not known yet."""
+        base, robot = self._base, self.robot
+        return base.frame(robot) if isinstance(base, FrameBase) and robot is not None else ""
+
+    def moved_by(self, scene: SourceScene) -> str | None:
+        """Return the frame whose transforms move the base; None if there is none."""
+        return None if self.robot is None else self._base.moved_by(self.robot, scene)
+
+    def restart(self, now_ns: int, scene: SourceScene) -> None:
+        """See Source."""
+        self._base.restart()
+        if self.robot is not None:
+            self._joints.restart()
 
     def settle(self, now_ns: int, scene: SourceScene) -> None:
         """See Source. Observes the bodies about which there is news."""
+        if not self._is_prepared:
+            self._take_prepared(scene)
+        if self._is_behind and scene.may_describe:
+            self._describe(scene)
         if self.robot is None or not (self._base.fresh or self._joints.fresh.any()):
             return
         base_is_fresh, fresh = self._base.fresh, self._joints.fresh.copy()
@@ -114,11 +144,20 @@ class RobotSource:
             topic = self._entry.joint_states or "no topic: give `joint_states`"
             more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
             joints = f"{', '.join(names[:_SHOWN])}{more}"
-            scene.refuse(self.name, f"expected positions of {joints} on {topic} not older than max_age")
+            text = f"expected positions of {joints} on {topic} not older than max_age"
+            scene.refuse(self.name, text)
+            scene.lacks(self.name, f"{self.name}: joints", text)
+        elif not lacking.any():
+            scene.has(self.name, f"{self.name}: joints")
         if len(chosen):
             self._observe(chosen, base, poses, twists, speed_known, now_ns, scene)
 
     # -- for a planning scene
+
+    @property
+    def disabled(self) -> frozenset[Pair]:
+        """The pairs of links that the SRDF disables."""
+        return frozenset() if self.robot is None else self.robot.disabled
 
     @property
     def link_ids(self) -> dict[str, int]:
@@ -152,19 +191,46 @@ class RobotSource:
     # -- descriptions
 
     def _take_text(self, topic: str, text: str, scene: SourceScene) -> None:
-        if topic == self._entry.urdf_topic:
-            self._urdf = Description(text, topic)
+        """Take a URDF or an SRDF. A robot that takes long is made beside the monitoring, if the scene has a way."""
+        given, is_urdf = Description(text, topic), topic == self._entry.urdf_topic
+        known = self._urdf if is_urdf else self._srdf
+        if known is not None and known.text == text and self.robot is not None and not self.robot.left_out:
+            return
+        if is_urdf:
+            self._urdf = given
         else:
-            self._srdf = Description(text, topic)
+            self._srdf = given
         if self._urdf is None:
             return
-        try:
-            robot = self._make(self._urdf)
-        except InputError as error:
-            scene.refuse(self.name, str(error))
+        with scene.guard(self.name):
+            if scene.preparation is None or not takes_long(self._urdf, self._srdf, self._entry.packages):
+                self._use(self._make(self._urdf), scene)
+                return
+            scene.preparation.start(self.name, self._urdf, self._srdf, self._entry.packages)
+            self._is_prepared = False
+            if self.robot is None:
+                scene.lacks(self.name, self.name, "its URDF or its meshes are large: it is made beside the monitoring")
             return
+        scene.lacks(self.name, self.name, scene.last_refusal[self.name])
+
+    def _take_prepared(self, scene: SourceScene) -> None:
+        """Use the robot that was made beside the monitoring, if it is ready."""
+        made = None if scene.preparation is None else scene.preparation.ended(self.name)
+        if made is None:
+            return
+        self._is_prepared = True
+        with scene.guard(self.name):
+            if isinstance(made, str):
+                raise InputError(made)
+            self._use(self._accept(made), scene)
+            return
+        scene.lacks(self.name, self.name, scene.last_refusal[self.name])
+
+    def _use(self, robot: Robot, scene: SourceScene) -> None:
+        """Show the links of a robot that is new or has changed."""
         for name in [name for name, body in self.attached.items() if body.link not in robot.tree.links]:
             self._forget(self.attached.pop(name), scene)
+        scene.has(self.name, self.name)
         self._report_problems(robot, scene)
         self._show(scene)
 
@@ -173,17 +239,27 @@ class RobotSource:
         self._described.pop(body.object_id, None)
 
     def _report_problems(self, robot: Robot, scene: SourceScene) -> None:
-        for problem in robot.problems:
+        scene.unmonitored.drop(self.name, f"{self.name}/")
+        by_link: dict[str, list[str]] = {}
+        for link, problem in robot.left_out:
             scene.refuse(self.name, problem)
+            by_link.setdefault(link, []).append(problem)
+        for link, texts in by_link.items():
+            if link:
+                scene.lacks(self.name, f"{self.name}/{link}", "; ".join(texts))
 
     def _make(self, urdf: Description) -> Robot:
-        robot = make_robot(urdf, self._srdf, self._entry.packages)
+        return self._accept(make_robot(urdf, self._srdf, self._entry.packages))
+
+    def _accept(self, robot: Robot) -> Robot:
+        """Take over a robot. Raises InputError if the file says more about it than it has."""
         for link in self._entry.allowed:
             if link not in robot.links:
                 raise InputError(f"{self.name}, allowed: expected a link with shapes, got {link!r:.80}")
         if self.robot is None or self.robot.tree.joints != robot.tree.joints:
             self._joints = JointTable(robot.tree, self._max_age)
         self.robot = robot
+        self._digests.clear()
         return robot
 
     def _show(self, scene: SourceScene) -> None:
@@ -211,23 +287,36 @@ class RobotSource:
         assert self.robot is not None
         rules, bodies = self._rules, [*self._links.values(), *self.attached.values()]
         allowed = allowed_contacts(self.robot, self._links, self.attached, self._entry.allowed, rules)
+        self._is_behind = False
         for body in bodies:
-            is_link = body is self._links.get(body.link)
             at = self._standing.get(body.object_id)
-            scale = rules.scale.get(body.link, 1.0) if is_link else 1.0
-            padding = self._entry.padding + (rules.padding.get(body.link, 0.0) if is_link else 0.0)
-            facts = scale, padding, allowed[body.object_id], at and pose_bytes(at), shape_bytes(body.shapes)
+            scale = rules.scale.get(body.link, 1.0)  # an attached object has those of its link, as in MoveIt
+            padding = self._entry.padding + rules.padding.get(body.link, 0.0)
+            facts = scale, padding, allowed[body.object_id], at and pose_bytes(at), self._digest(body)
             if self._described.get(body.object_id) == facts:
                 continue
-            try:
+            if not scene.may_describe:
+                self._is_behind = True
+                break
+            with scene.guard(self.name, body.name):
                 scene.describe(self._description(body, scale, padding, allowed[body.object_id], at))
-            except CollisionMonitorError as error:
-                scene.refuse(self.name, str(error))
+                self._described[body.object_id] = facts
+                scene.has(self.name, body.name)
                 continue
-            self._described[body.object_id] = facts
+            if body.object_id not in self._described:
+                scene.lacks(self.name, body.name, scene.last_refusal[self.name])
         moving = [it for it in bodies if it.object_id in self._described and it.object_id not in self._standing]
         self._moving = CarriedBodies(moving, self.robot.tree.links)
         self._needs = self.robot.tree.needs[self._moving.rows]
+
+    def _digest(self, body: Body) -> bytes:
+        """Return what is equal for equal shapes, computed once for each."""
+        known = self._digests.get(id(body.shapes))
+        if known is None:
+            if len(self._digests) > MOST_DIGESTS:
+                self._digests.clear()
+            known = self._digests[id(body.shapes)] = body.shapes, shape_digest(body.shapes)
+        return known[1]
 
     def _description(
         self, body: Body, scale: float, padding: float, allowed: tuple[int, ...], at: Pose | None
@@ -280,15 +369,16 @@ class RobotSource:
                 states[field_name] = column
         unknown = (self._needs[chosen] & ~speed_known).any(axis=1) | (not base.motion.twist_known)
         states["flags"][unknown] |= np.uint32(StateFlag.TWIST_UNKNOWN)
-        scene.observe(states, now_ns)
+        scene.observe(self.name, states, now_ns)
 
     def _refuse_unknown(self, names: Any, scene: SourceScene) -> None:
         """Count each joint once that no robot of the file has."""
         assert self.robot is not None
         for name in names:
             if name not in self.robot.known_joints and name not in self._unknown_joints:
-                if len(self._unknown_joints) < 1000:
-                    self._unknown_joints.add(name)
+                if len(self._unknown_joints) >= MOST_UNKNOWN_JOINTS:
+                    return
+                self._unknown_joints.add(name[:256])
                 if not any(other.robot is not None and name in other.robot.known_joints for other in self._fleet):
                     topic = self._entry.joint_states
                     scene.refuse(self.name, f"expected joints of its URDF on {topic}, got {name!r:.80}")

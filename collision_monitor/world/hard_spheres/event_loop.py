@@ -22,7 +22,6 @@ from collision_monitor.world.hard_spheres.state import (
     VELOCITY,
     VIRIAL,
     WALL,
-    WALL_HITS,
     WALL_IMPULSE,
     Floats,
     Indices,
@@ -147,7 +146,6 @@ def _bounce(state: State, i: int, axis: int, now: float) -> None:
     state.spheres[i, X + axis] = state.side - radius if speed > 0.0 else radius
     state.spheres[i, VELOCITY + axis] = -restitution * speed
     _count(state, i, now)
-    state.totals[WALL_HITS] += 1
     state.totals[WALL_IMPULSE] += (1.0 + restitution) * abs(speed) * state.masses[i]
 
 

@@ -8,6 +8,7 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from collision_monitor.checks.numbers import as_numbers
 from collision_monitor.errors import InputError
 from collision_monitor.world.hard_spheres.event_loop import (
     DONE,
@@ -25,7 +26,6 @@ from collision_monitor.world.hard_spheres.state import (
     LOGGED,
     VELOCITY,
     VIRIAL,
-    WALL_HITS,
     WALL_IMPULSE,
     Floats,
     largest_half_cell,
@@ -210,11 +210,6 @@ class HardSpheres:
         return int(self._state.totals[COLLISIONS])
 
     @property
-    def wall_collisions(self) -> int:
-        """Number of collisions with a wall since the start."""
-        return int(self._state.totals[WALL_HITS])
-
-    @property
     def packing(self) -> float:
         """Part of the cube that the spheres fill."""
         return float(4.0 / 3.0 * np.pi * (self.radii**3).sum() / self.side**3)
@@ -261,7 +256,7 @@ def _masses(radii: Floats) -> Floats:
 
 
 def _radii(radii: ArrayLike, count: int) -> Floats:
-    sizes = np.asarray(radii, dtype=np.float64)
+    sizes = as_numbers(radii, "radii")
     if sizes.shape not in ((), (count,)):
         raise InputError(f"radii: expected one number or {count} numbers, got an array of shape {sizes.shape}")
     if not (np.isfinite(sizes).all() and (sizes > 0.0).all()):
@@ -274,7 +269,7 @@ def _radii(radii: ArrayLike, count: int) -> Floats:
 
 
 def _rows(values: ArrayLike, name: str) -> Floats:
-    array = np.asarray(values, dtype=np.float64)
+    array = as_numbers(values, name)
     if array.ndim != 2 or array.shape[1] != 3 or not np.isfinite(array).all():
         raise InputError(f"{name}: expected an array (N, 3) of finite numbers, got shape {array.shape}")
     return array

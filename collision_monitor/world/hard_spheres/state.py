@@ -23,9 +23,9 @@ CELL_EXIT: Final = -2
 WALL: Final = -3
 """Codes of events without a partner: the exit from the cell, and WALL - k for a wall across axis k."""
 
-COLLISIONS, WALL_HITS, VIRIAL, WALL_IMPULSE, EPOCH, LOGGED = range(6)
-"""Elements of `State.totals`: collisions of two spheres, of a sphere and a wall, the sum of -r_ij . dp_i (J), the
-momentum that the walls took (kg m/s), the time (s) to which the clocks were last set back, and rows of the log."""
+COLLISIONS, VIRIAL, WALL_IMPULSE, EPOCH, LOGGED = range(5)
+"""Elements of `State.totals`: collisions of two spheres, the sum of -r_ij . dp_i (J), the momentum that the walls took
+(kg m/s), the time (s) to which the clocks were last set back, and rows of the log."""
 
 CELL: Final = 0.2
 """Half the side of a sphere's cell as part of the mean distance of neighbours. Larger: longer lists. Smaller: more
@@ -129,7 +129,7 @@ def make_state(
         hits=np.zeros(count, np.int32),
         times=times,
         winners=winners,
-        totals=np.zeros(6),
+        totals=np.zeros(5),
         side=side,
         per_side=1.0 / side if periodic else 0.0,
         half_cell=half_cell,

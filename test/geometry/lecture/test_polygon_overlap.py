@@ -93,9 +93,25 @@ def test_sat_ends_at_the_first_separating_axis():
     assert not right.overlaps and right.distance == 1 and right.axis.tolist() == [1, 0]
     assert (right.edge, right.tested) == (1, 2)
     over = sat_2d(square, square + np.array([0.75, 0.5]))
-    assert over.overlaps and over.distance == -0.25 and over.axis.tolist() == [1, 0] and over.tested == 8
+    assert over.overlaps and over.distance == -0.25 and over.axis.tolist() == [1, 0] and over.tested == 4
     touching = sat_2d(square, square + np.array([1, 0.3]))
     assert touching.overlaps and touching.distance == 0
+
+
+def regular(corners, turn=0.0):
+    angle = turn + 2 * np.pi * np.arange(corners) / corners
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+
+@pytest.mark.parametrize("turn", np.linspace(0, 3, 40))
+def test_parallel_edges_of_a_polygon_share_an_axis(turn):
+    """The lecture counts four axes of two squares: two of each."""
+    for a, b, count in ((4, 4, 4), (3, 4, 5), (6, 3, 6), (8, 6, 7), (5, 5, 10)):
+        first, second = regular(a, turn), regular(b, 2 * turn + 0.1) * 0.5
+        assert sat_2d(first, second).tested == count
+        assert sat_2d(first[::-1], second + 0.2).tested == count
+    with_a_straight_corner = np.array([[0, 0], [1, 0], [2, 0], [2, 1], [0, 1]])
+    assert sat_2d(with_a_straight_corner, regular(4)).tested == 4
 
 
 def test_a_common_motion_changes_nothing():

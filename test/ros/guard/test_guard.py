@@ -2,83 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import signal
-import subprocess
-import sys
-from pathlib import Path
 
-import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from nav_msgs.msg import Odometry
-from rclpy.qos import DurabilityPolicy, QoSProfile
-from std_msgs.msg import String
 
-from collision_monitor import records
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.shapes.registry import Cylinder
-
-RULES = Path(__file__).parents[3] / "config/guard_rules.yaml"
-PROGRAM = "import sys; from collision_monitor.ros.executables import guard; sys.exit(guard())"
-
-
-@pytest.fixture
-def guard(ros_domain_id):
-    started = []
-
-    def start_guard(*arguments):
-        command = [sys.executable, "-c", PROGRAM, "--ros-args", *(each for a in arguments for each in ("-p", a))]
-        process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=dict(os.environ))
-        started.append(process)
-        return process
-
-    yield start_guard
-    for process in started:
-        process.kill()
-        process.communicate()
-
-
-class Base:
-    """A planner and a base: sends commands and keeps what the guard passes, and what it says."""
-
-    def __init__(self, team, kind=Twist):
-        self.team, self.kind, self.passed, self.said = team, kind, [], []
-        self._out = team.node.create_publisher(kind, "/cmd_vel_in", 1)
-        team.node.create_subscription(kind, "/cmd_vel_out", self.passed.append, 10)
-        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        team.node.create_subscription(String, "/guard/state", lambda m: self.said.append(m.data), latched)
-
-    def send(self, x):
-        message = self.kind()
-        (message.twist if self.kind is TwistStamped else message).linear.x = x
-        self._out.publish(message)
-
-    def last(self):
-        message = self.passed[-1]
-        return (message.twist if self.kind is TwistStamped else message).linear.x
-
-    def hears(self, words):
-        """Say whether the guard's newest state, if one has arrived, contains these words."""
-        return bool(self.said) and words in self.said[-1]
-
-    def drive(self, x, condition, states=None, timeout=30.0):
-        """Send commands, and states if there are any, until the condition holds."""
-
-        def look():
-            self.send(x)
-            if states is not None:
-                self.team.say(*states)
-            self.team.listen(0.03)
-            return condition()
-
-        self.team.until(look, timeout)
-
-
-def row(object_id, x):
-    state = np.zeros((), records.STATE)
-    state["id"], state["quaternion"], state["position"] = object_id, (0, 0, 0, 1), (x, 0, 0)
-    return state
+from test.ros.guard.conftest import RULES, Base, row
 
 
 @pytest.mark.parametrize("kind", [Twist, TwistStamped])
@@ -122,39 +54,37 @@ objects:
 """
 
 
-def test_objects_of_a_sources_file_are_guarded_too(start, team, guard, tmp_path):
+def test_objects_of_a_sources_file_are_guarded_too(start, team, base, guard, tmp_path):
     (tmp_path / "sources.yaml").write_text(SOURCES)
-    base = Base(team)
     guard("robot:=robot_1", "max_age:=1.0")
     start("run", "--rules", str(RULES), "--sources", "sources.yaml")
     odometry = team.node.create_publisher(Odometry, "/odom", 10)
     person = team.node.create_publisher(PoseStamped, "/person", 10)
 
-    def drive(distance, speed):
-        """Send commands until this one passes, with the person at a distance before the robot."""
+    def drive(distance, speed, words="", timeout=60.0):
+        """Send commands until this one passes, with the person at a distance before the robot, or missing."""
 
-        def look():
+        def send():
             here, there = Odometry(child_frame_id="base"), PoseStamped()
             for message in (here, there):
                 message.header.stamp, message.header.frame_id = team.node.get_clock().now().to_msg(), "map"
             here.pose.pose.orientation.w = there.pose.orientation.w = 1.0
-            there.pose.position.x = distance
             odometry.publish(here)
-            person.publish(there)
+            if distance is not None:
+                there.pose.position.x = distance
+                person.publish(there)
             base.send(0.4)
-            team.listen(0.03)
-            return base.passed and base.last() == speed
 
-        team.until(look, 60.0)
+        base.drive_by(send, lambda: base.passed and base.last() == speed and base.hears(words), None, timeout)
 
+    drive(None, 0.0, "not monitored, though the rules name it: person: no message on /person yet")
     drive(9.0, 0.4)
-    drive(0.8, 0.0)
-    team.until(lambda: base.hears("stops: critical: robot_1 and person: distance"))
+    drive(0.8, 0.0, "stops: critical: robot_1 and person: distance")
     drive(9.0, 0.4)
+    drive(None, 0.0, "'person': no usable new state for 1.")
 
 
-def test_a_monitor_without_rules_stops_the_robot(start, team, guard):
-    base = Base(team)
+def test_a_monitor_without_rules_stops_the_robot(start, team, base, guard):
     guard("robot:=robot_1", "max_age:=1.0")
     start("run")
     team.meet()
@@ -168,13 +98,16 @@ def test_a_monitor_without_rules_stops_the_robot(start, team, guard):
     ("given", "said"),
     [
         ([], "parameter robot: expected the name of the robot's object"),
+        (["robot:=[]"], "parameters: expected a value with a type for each, got an empty list"),
+        (["robot:=' , '"], "parameter robot: expected the name of the robot's object"),
+        (["robot:=7"], "parameter robot: expected a text or a list of texts, got 7"),
+        (["robot:=arm/*"], "parameter base: expected the name of the object whose frame the commands have"),
         (["robot:=r", "max_age:=0.0"], "parameter max_age: expected 0.001 to 1000, got 0"),
+        (["robot:=r", "obstacle_timeout:=.nan"], "parameter obstacle_timeout: expected 0.001 to 1000, got nan"),
         (["robot:=r", "caution_factor:=2.0"], "parameter caution_factor: expected 0 to 1, got 2"),
         (["robto:=r"], "parameter 'robto' is unknown: did you mean 'robot'?"),
     ],
 )
-def test_impossible_parameters_are_refused(guard, given, said):
-    process = guard(*given)
-    _, words = process.communicate(timeout=60.0)
-    assert process.returncode == 2
-    assert said in words
+def test_impossible_parameters_are_refused(guard, given, said, tmp_path):
+    assert guard(*given).wait(60.0) == 2
+    assert said in (tmp_path / "guard_0.txt").read_text()

@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from collision_monitor.alerts.rules_in_force import RuleInForce
 from collision_monitor.codec import MonitorStatus
 from collision_monitor.ros.health.health import HISTORY, DiagnosticLevel, LastReports, NodeFacts, Report, reports
 from collision_monitor.ros.health.line_report import LineReport
@@ -171,3 +172,27 @@ def test_without_a_configuration_there_is_nothing_to_report(failure: str, level:
     assert [report.level for report in found] == [level, *[DiagnosticLevel.STALE] * 3]
     assert "unconfigured: no answers are published" in found[0].text
     assert failure in found[0].text
+
+
+def test_what_the_sources_file_asks_for_and_is_not_monitored_is_an_error_until_it_is_there() -> None:
+    line = LineReport("cart", "/odom", "nav_msgs/msg/Odometry", 5, 5, 0, "", 0, DiagnosticLevel.OK, "ok")
+    texts = tuple(f"shelf_{k}: no frame" for k in range(7))
+    history = LastReports()
+    found = by_task(reports("active", "", facts(sources=(line,), unmonitored=texts), history))["sources"]
+    assert found.level == DiagnosticLevel.ERROR
+    assert found.text.startswith("not monitored: shelf_0: no frame; not monitored: shelf_1: no frame")
+    assert found.text.endswith("not monitored: 2 more, see ~/sources")
+    assert found.values["not monitored"] == "7"
+    found = by_task(reports("active", "", facts(sources=(line,)), history))["sources"]
+    assert (found.level, found.text) == (DiagnosticLevel.OK, "1 topics")
+
+
+def test_a_rule_that_covers_nobody_is_a_warning() -> None:
+    good = RuleInForce("guard", "covers robot_1 against every other object", True, {})
+    bad = RuleInForce("people", "covers nobody", False, {})
+    assert "rules" not in by_task(reports("active", "", facts(), LastReports()))
+    found = by_task(reports("active", "", facts(rules=(good,)), LastReports()))["rules"]
+    assert (found.level, found.text) == (DiagnosticLevel.OK, "1 in force, each covers somebody")
+    found = by_task(reports("active", "", facts(rules=(good, bad)), LastReports()))["rules"]
+    assert (found.level, found.text) == (DiagnosticLevel.WARN, "rule 'people' covers nobody")
+    assert found.values == {"guard": good.summary, "people": bad.summary}

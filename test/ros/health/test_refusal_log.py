@@ -194,3 +194,27 @@ def test_a_clock_that_stands_still_is_silence(start, team):
     assert monitor.stop() == 0
     assert "no newer states on /object_monitor/objects/states: all moving objects are stale" in monitor.words
     assert "got another one with the same stamp" in monitor.words
+
+
+def test_objects_without_a_state_are_named_at_the_second_look_and_every_ten_seconds(pipeline, monitor, lines):
+    log = RefusalLog(pipeline, lines.append)
+    monitor.step(0, np.stack([state(k) for k in range(3, 9)]))
+    for k in range(45):
+        log.report_unseen("/states", k * SECOND // 2)
+        if k == 0:
+            assert lines == []  # it may just have been described
+    text = "/states: no state so far of object 1 ('ball 1'), 2 ('\\x1b[31mred\\n'): nothing is known about it"
+    assert lines == [text] * 3
+    monitor.step(SECOND, np.stack([state(k) for k in range(1, 9)]))
+    for k in range(45, 90):
+        log.report_unseen("/states", k * SECOND // 2)
+    assert len(lines) == 3
+
+
+def test_a_monitor_without_any_state_says_so_after_some_seconds(pipeline, lines):
+    log = RefusalLog(pipeline, lines.append)
+    for k in range(70):
+        log.report_unseen("/states", k * SECOND // 2)
+        if k == 9:
+            assert lines == []
+    assert lines == ["/states: no state arrived so far, neither here nor from a sources file"] * 3

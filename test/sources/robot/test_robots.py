@@ -241,7 +241,7 @@ def test_paths_are_relative_to_the_file_and_errors_name_its_line(tmp_path: Path)
     mapping = load_mapping(path)
     with pytest.raises(InputError) as caught:
         Feed(mapping, Decoder(definitions()))
-    assert mapping.located(str(caught.value)).startswith(f"{path}, line 4: arm, urdf: expected the file {tmp_path}")
+    assert mapping.located(str(caught.value)).startswith(f"{path}, line 4: arm, urdf: expected the file '{tmp_path}")
 
 
 def test_time_that_jumps_back_begins_anew() -> None:

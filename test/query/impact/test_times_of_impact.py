@@ -122,12 +122,12 @@ def test_what_touches_is_followed_here_too():
         ),
         ({"poses_a": [STILL] * 2, "poses_b": [STILL] * 3}, cm.InputError, "as many motions of A as of B, got 2 and 3"),
         ({"horizon": -1}, cm.InputError, "horizon"),
-        ({"shape_a": cm.HalfSpace((0, 0, 1), 0), "twists_a": np.ones(6)}, cm.UnsupportedError, "turn"),
+        ({"shapes_a": cm.HalfSpace((0, 0, 1), 0), "twists_a": np.ones(6)}, cm.UnsupportedError, "turn"),
     ],
     ids=lambda value: "",
 )
 def test_what_is_refused(change, error, words):
-    arguments = {"shape_a": BOX, "poses_a": STILL, "twists_a": np.zeros(6)}
-    arguments |= {"shape_b": BOX, "poses_b": STILL, "twists_b": np.zeros(6)} | change
+    arguments = {"shapes_a": BOX, "poses_a": STILL, "twists_a": np.zeros(6)}
+    arguments |= {"shapes_b": BOX, "poses_b": STILL, "twists_b": np.zeros(6)} | change
     with pytest.raises(error, match=words):
         time_of_impact_batch(**arguments)

@@ -22,12 +22,13 @@ DEEPEST: Final = 50
 
 @dataclass(eq=False)
 class Element:
-    """An XML element. where: `FILE, line N`, for the texts of errors."""
+    """An XML element. where: `FILE, line N`, for the texts of errors. content: the text in it, if it was read."""
 
     tag: str
     attributes: dict[str, str]
     where: str
     children: list[Element] = field(default_factory=list)
+    content: str = ""
 
     def all(self, tag: str) -> Iterator[Element]:
         """Yield the children with this tag."""
@@ -46,6 +47,8 @@ class Element:
         """Return an attribute that is not empty. Raises InputError."""
         value = self.attributes.get(key, "").strip()
         if not value:
+            if key in self.attributes:
+                raise self.error(f"{key}: expected a value, got an empty text")
             raise self.error(f"expected an attribute {key}, got {', '.join(self.attributes) or 'no attribute'}")
         return value
 
@@ -70,14 +73,16 @@ class Element:
         return numbers
 
 
-def parse_xml(text: str | bytes, name: str) -> Element:
+def parse_xml(text: str | bytes, name: str, *, largest: int = LARGEST_TEXT, contents: bool = False) -> Element:
     """Return the root element of an XML text. name: of its file, for errors. Raises InputError.
+
+    largest: characters. contents: whether the texts in the elements are read too, which URDF has none of.
 
     A document type, and with it every entity of its own, is refused: a few lines of entities expand to gigabytes.
     """
-    if len(text) > LARGEST_TEXT:
-        raise InputError(f"{name}: expected XML of at most {LARGEST_TEXT} characters, got {len(text)}")
-    builder = _Builder(name)
+    if len(text) > largest:
+        raise InputError(f"{name}: expected XML of at most {largest} characters, got {len(text)}")
+    builder = _Builder(name, contents)
     try:
         builder.parser.Parse(text, True)
     except expat.ExpatError as error:
@@ -89,13 +94,17 @@ def parse_xml(text: str | bytes, name: str) -> Element:
 
 
 class _Builder:
-    def __init__(self, name: str) -> None:
+    def __init__(self, name: str, contents: bool) -> None:
         self.root = Element("", {}, name)
         self.parser = expat.ParserCreate()
         self.parser.StartElementHandler = self._start
         self.parser.EndElementHandler = self._end
         self.parser.StartDoctypeDeclHandler = self._refuse_document_type
+        if contents:
+            self.parser.buffer_text = True
+            self.parser.CharacterDataHandler = self._add
         self._name = name
+        self._texts: list[list[str]] = [[]]
         self._open = [self.root]
         self._count = 0
 
@@ -110,9 +119,13 @@ class _Builder:
         element = Element(tag, attributes, self._where())
         self._open[-1].children.append(element)
         self._open.append(element)
+        self._texts.append([])
 
     def _end(self, tag: str) -> None:
-        self._open.pop()
+        self._open.pop().content = "".join(self._texts.pop())
+
+    def _add(self, text: str) -> None:
+        self._texts[-1].append(text)
 
     def _refuse_document_type(self, *_: Any) -> None:
         raise InputError(f"{self._where()}: expected XML without a document type, got <!DOCTYPE …>")

@@ -1,0 +1,149 @@
+"""A sensor that fails leaves what it saw: stale and listed, never as free space."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from fed import Fed
+from foreign_bag import START, odometry, transforms
+from foreign_messages import detection, detections, laser_scan, point_cloud, track, tracked_objects
+
+STEP = 50_000_000
+NAN, INF = math.nan, math.inf
+SPHERE = {"sphere": 1.0}
+
+
+def at(k: int) -> int:
+    return START + k * STEP
+
+
+def scan(k: int, ranges: Any, **fields: float) -> tuple[str, int, tuple[str, Any]]:
+    kind, content = laser_scan("map", at(k), ranges, start=0.0, step=0.5)
+    for name, value in fields.items():
+        setattr(content, name, value)
+    return "/scan", at(k), (kind, content)
+
+
+def points_of(fed: Fed) -> Any:
+    """The points of the last scan in the monitor's frame; none if its object was removed."""
+    last = fed.changes[-1]
+    if not hasattr(last, "shapes"):
+        return np.zeros((0, 3))
+    (cloud, _), = last.shapes
+    return cloud.points + last.pose.position  # type: ignore[union-attr]
+
+
+FAILED: dict[str, tuple[Any, dict[str, float]]] = {
+    "all NaN": ([NAN] * 4, {}),
+    "all 0": ([0.0] * 4, {}),
+    "all below range_min": ([0.05] * 4, {}),
+    "all negative": ([-1.0] * 4, {}),
+    "NaN and 0": ([NAN, 0.0, NAN, 0.05], {}),
+    "no beam": ([], {}),
+    "range_max 0": ([1.0, INF, 2.0, INF], {"range_max": 0.0}),
+    "range_max NaN": ([1.0, INF, 2.0, INF], {"range_max": NAN}),
+    "range_max below range_min": ([1.0, INF, 2.0, INF], {"range_max": 0.05}),
+    "range_min NaN": ([1.0, INF, 2.0, INF], {"range_min": NAN}),
+    "angle_increment NaN": ([1.0, INF, 2.0, INF], {"angle_increment": NAN}),
+    "angle_increment infinite": ([1.0, INF, 2.0, INF], {"angle_increment": INF}),
+    "angle_increment 0": ([1.0, INF, 2.0, INF], {"angle_increment": 0.0}),
+    "angle_min NaN": ([1.0, INF, 2.0, INF], {"angle_min": NAN}),
+    "angle_min of no angle": ([1.0, INF, 2.0, INF], {"angle_min": 1e30}),
+}
+
+
+@pytest.mark.parametrize("failure", FAILED)
+def test_a_scan_that_measures_nothing_removes_nothing_and_is_listed(failure: str) -> None:
+    ranges, fields = FAILED[failure]
+    fed = Fed({"scan": {"topic": "/scan"}}, begin=START)
+    fed.give(*scan(0, [1.0, INF, 2.0, INF]))
+    before = points_of(fed)
+    fed.give(*scan(1, ranges, **fields))
+    assert len(fed.changes) == 1 and len(before) == 2
+    assert sum(fed.refused.values()) == 1 and next(iter(fed.refused)).startswith("scan: ")
+    assert [(row.line, row.what) for row in fed.feed.unmonitored] == [("scan", "/scan")]
+    fed.give(*scan(2, [INF, INF, INF, 3.0]))
+    assert not fed.feed.unmonitored and len(points_of(fed)) == 1
+    fed.give(*scan(3, [INF] * 4))
+    assert fed.names[-1].startswith("-")  # this scan says that nothing is there
+
+
+def test_too_near_to_measure_is_something_at_the_least_range() -> None:
+    fed = Fed({"scan": {"topic": "/scan"}})
+    fed.give(*scan(0, [INF, -INF, INF, INF]))
+    np.testing.assert_allclose(points_of(fed), [[0.1 * math.cos(0.5), 0.1 * math.sin(0.5), 0]], atol=1e-6)
+    fed.give(*scan(1, [-INF] * 4))
+    assert len(points_of(fed)) == 4 and not fed.refused
+
+
+def test_each_beam_that_fails_keeps_what_it_met_in_the_world() -> None:
+    """The robot drives on: what a beam met stays where it was, until the beam measures again."""
+    fed = Fed({"scan": {"topic": "/scan"}})
+
+    def see(k: int, x: float, ranges: Any) -> Any:
+        fed.give("/tf", at(k), transforms(at(k), ("map", "laser", (x, 0, 0), (0, 0, 0, 1))))
+        kind, content = laser_scan("laser", at(k), ranges, start=0.0, step=math.pi / 2)
+        fed.give("/scan", at(k), (kind, content))
+        return {tuple(np.round(point, 6)) for point in points_of(fed)}
+
+    assert see(0, 0.0, [5, 2, INF, NAN]) == {(5, 0, 0), (0, 2, 0)}
+    assert see(1, 1.0, [NAN, 3, INF, NAN]) == {(5, 0, 0), (1, 3, 0)}
+    assert see(2, 2.0, [NAN, NAN, INF, NAN]) == {(5, 0, 0), (1, 3, 0)}
+    assert see(3, 3.0, [INF, NAN, 1, 0]) == {(1, 3, 0), (2, 0, 0)}
+    assert see(4, 3.0, [INF, INF, INF, INF]) == set()
+    assert fed.feed.scene.points_dropped["scan"] == 1 + 2 + 3 + 2 + 0
+
+
+def test_a_driver_that_writes_nan_for_nothing_can_say_so() -> None:
+    fed = Fed({"scan": {"topic": "/scan", "nan_is_free": True}, "cloud": {"topic": "/cloud", "nan_is_free": True}})
+    fed.give(*scan(0, [1.0, NAN, 2.0, NAN]))
+    fed.give("/cloud", at(0), point_cloud("map", at(0), [(1, 0, 0)]))
+    assert len(points_of(fed)) == 1
+    fed.give(*scan(1, [NAN] * 4))
+    fed.give("/cloud", at(1), point_cloud("map", at(1), [(NAN, 0, 0)]))
+    assert fed.names == ["scan", "cloud", "-1", "-2"] and not fed.refused
+
+
+def test_a_cloud_without_a_finite_point_removes_nothing_and_an_empty_one_does() -> None:
+    fed = Fed({"cloud": {"topic": "/cloud"}})
+    fed.give("/cloud", at(0), point_cloud("map", at(0), [(1, 0, 0)]))
+    fed.give("/cloud", at(1), point_cloud("map", at(1), [(NAN, 0, 0), (INF, 0, 0)]))
+    assert fed.names == ["cloud"] and "expected finite ones, got none of 2" in next(iter(fed.refused))
+    fed.give("/cloud", at(2), point_cloud("map", at(2), []))
+    assert fed.names == ["cloud", "-1"]
+
+
+@pytest.mark.parametrize("kind", ["tracks", "detections", "scan"])
+def test_a_sensor_that_falls_silent_leaves_what_it_saw_and_is_listed(kind: str) -> None:
+    seen = {
+        "tracks": lambda k: tracked_objects("map", at(k), track(1, (0, 0, 0))),
+        "detections": lambda k: detections("map", at(k), detection((0, 0, 0), name="1")),
+        "scan": lambda k: laser_scan("map", at(k), [1.0, 2.0]),
+    }[kind]
+    objects = {"robot": {"topic": "/odom", "shape": SPHERE}, "it": {"topic": "/it"}}
+    fed = Fed(objects, begin=START, rate=20)
+    for k in range(200):
+        fed.give("/odom", at(k), odometry("map", at(k), (k, 9, 0), (0, 0, 0, 1), (0, 0, 0), (0, 0, 0)))
+        if k < 40:
+            fed.give("/it", at(k), seen(k))
+        elif k == 55:
+            assert not fed.feed.unmonitored
+    assert not any(name.startswith("-") for name in fed.names)
+    (row,) = fed.feed.unmonitored
+    assert (row.line, row.what, row.reason) == (
+        "it", "/it", "no message on /it for more than 1 s: what it held last stays"
+    )  # fmt: skip
+    assert row.since_ns == at(39)
+    fed.give("/it", at(200), seen(200))
+    assert not fed.feed.unmonitored
+
+
+def test_a_tracker_that_sends_an_empty_message_says_that_nothing_is_there() -> None:
+    fed = Fed({"it": {"topic": "/it", "forget_after": 0.2}})
+    fed.give("/it", at(0), tracked_objects("map", at(0), track(1, (0, 0, 0))))
+    for k in range(1, 8):
+        fed.give("/it", at(k), tracked_objects("map", at(k)))
+    assert [name.startswith("-") for name in fed.names] == [False, True]
