@@ -290,7 +290,7 @@ def tube_of(A, B, begin):
     )
 
 
-class Bodies(NamedTuple):
+class BodyPair(NamedTuple):
     """Two bodies as a search of their impact sees them: their motions (MOTION), first shapes and spin radii (m)."""
 
     A: Any
@@ -305,14 +305,14 @@ class Bodies(NamedTuple):
 def body_impact(multibody, i, j, window, query, scratch, event):
     """Write the first impact of bodies i and j in the window into the IMPACT record `event`.
 
-    event.status = CLEAR if there is none. Bodies that overlap, or are within query.margin, at the begin have their
+    event.status = CLEAR if there is none. BodyPair that overlap, or are within query.margin, at the begin have their
     impact there. The reference motions and their tubes are those in `bodies`; in the record, i is the body with the
     smaller id. Returns the number of distance queries.
     """
     table, parts, bodies = multibody
     if bodies.id[i] > bodies.id[j]:
         i, j = j, i
-    pair = Bodies(
+    pair = BodyPair(
         bodies.motion[i], bodies.motion[j], bodies.first_shape[i], bodies.first_shape[j],
         bodies.spin_radius[i], bodies.spin_radius[j],
     )  # fmt: skip
@@ -324,7 +324,7 @@ def body_impact(multibody, i, j, window, query, scratch, event):
 
 @device
 def chains_impact(table, parts, pair, window, query, scratch, event):
-    """`body_impact` of two chains of shapes (`Bodies`), without what names the bodies in the record.
+    """`body_impact` of two chains of shapes (`BodyPair`), without what names the bodies in the record.
 
     This is the impact of any two bodies: of the monitor, of single queries and of their batches.
     """

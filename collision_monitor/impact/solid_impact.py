@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Final
 
-from collision_monitor._jit import outlined
+from collision_monitor._jit import inlined, outlined
 from collision_monitor.geometry.vector import dot
 from collision_monitor.impact.impact_record import CLEAR, HIT, UNRESOLVED
 from collision_monitor.impact.mesh_pair import root_of
@@ -38,6 +38,24 @@ from collision_monitor.shapes.kinds.half_space import HALF_SPACE
 EXAMINED: Final = 30
 """Steps that a triangle counts as, of the STEPS: GJK takes as long as 30 boxes. 50,000 slivers in one line need more
 than any limit."""
+
+
+@inlined
+def _farthest(blocks, block, k, solid):
+    """Bound on the distance of the solid from the farthest point of a box (m)."""
+    center = place_point(inverse(solid.X), center_of(blocks, block, k))
+    return point_distance_range(solid.table, solid.b, center)[1] + box_radius(blocks, block, k)
+
+
+@inlined
+def _times_of_members(blocks, block, solid, work):
+    """Write to work[BOUNDS:] until when the boxes of a block stay apart from the solid (s); return the least."""
+    soon = inf
+    for m in range(WIDTH):
+        if blocks[block, CHILD, m] != 0.0:
+            work[BOUNDS + m] = box_time(blocks, block, m, solid)
+            soon = min(soon, work[BOUNDS + m])
+    return soon
 
 
 @outlined
@@ -74,8 +92,7 @@ def solid_impact(table, parts, pair, window, tube, query, ending, scratch):
         speed += sqrt(move.bend_a) * reach_in(blocks, root) + sqrt(move.bend_b) * own
         if is_early:
             gap = ending_gap(ending, speed, t, query)
-            _, farthest, _ = point_distance_range(table, b, place_point(inverse(X), center_of(blocks, i, k)))
-            if farthest + box_radius(blocks, i, k) <= gap + move.start:
+            if _farthest(blocks, i, k, solid) <= gap + move.start:
                 return UNRESOLVED, t, 1 + steps // STEPS, gap
         if child < 0.0:
             enough = (keep * size_of(blocks, i, k) + gap) / speed  # points have no size
@@ -89,11 +106,7 @@ def solid_impact(table, parts, pair, window, tube, query, ending, scratch):
             if t + soon <= t:  # the time has no finer resolution
                 return UNRESOLVED, t, 1 + steps // STEPS, 0.0
         else:
-            soon = inf
-            for m in range(WIDTH):
-                if blocks[block, CHILD, m] != 0.0:
-                    work[BOUNDS + m] = box_time(blocks, block, m, solid)
-                    soon = min(soon, work[BOUNDS + m])
+            soon = _times_of_members(blocks, block, solid, work)
         if child < 0.0 or (soon * speed > keep * size_of(blocks, i, k) and t + soon > t):
             if t + soon < end:
                 waiting = push_pair(work, waiting, t + soon, place, 0.0, 0.0)

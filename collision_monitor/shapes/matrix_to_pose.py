@@ -16,8 +16,8 @@ def matrix_to_pose(X: Any) -> tuple[float, Any]:
     """How far the upper left (3, 3) of a matrix is from a rotation, and x, y, z, qx, qy, qz, qw of it.
 
     X: (4, 4), or (3, 3) for a position of 0. The first number is the error of the products of its rows, infinite for
-    a reflection, for another last row than 0 0 0 1, and for what is not finite. The largest of 4 qx^2, 4 qy^2, 4 qz^2, 4 qw^2 loses no digits. (Shepperd,
-    Quaternion from rotation matrix, 1978)
+    a reflection, for another last row than 0 0 0 1, and for what is not finite. The largest of 4 qx^2, 4 qy^2, 4 qz^2
+    and 4 qw^2 loses no digits. (Shepperd, Quaternion from rotation matrix, 1978)
     """
     a, b, c = X[0, 0], X[0, 1], X[0, 2]
     d, e, f = X[1, 0], X[1, 1], X[1, 2]

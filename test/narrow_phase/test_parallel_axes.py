@@ -51,7 +51,7 @@ def test_depth_is_the_least_over_all_directions(a, b, R):
 
 @pytest.mark.parametrize(("a", "b"), list(product(REVOLVED, REVOLVED)), ids=repr)
 def test_axes_that_are_nearly_parallel_have_nearly_the_depth_of_parallel_ones(a, b):
-    """A turn by an angle moves no point of B by more than the angle times its size, here 1 m; EPA alone knew only mm."""
+    """A turn by an angle moves no point of B by more than the angle times its size, 1 m; EPA alone knew only mm."""
     rng = np.random.default_rng(8)
     for angle in 10.0 ** np.arange(-13.0, -3.0):
         p = np.array([0.0, 0.0, rng.uniform(-0.2, 0.2)]) if angle < 1e-6 else rng.uniform(-0.1, 0.1, 3)

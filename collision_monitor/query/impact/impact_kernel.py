@@ -14,7 +14,7 @@ from collision_monitor._jit.settled import settled
 from collision_monitor.impact.body_contact import RESULT, chains_contact
 from collision_monitor.impact.body_impact import (
     NO_PLACES,
-    Bodies,
+    BodyPair,
     ImpactQuery,
     Scratch,
     ShapePair,
@@ -92,7 +92,7 @@ def _first_impact(table: Any, parts: Any, chains: Any, window: Any, search: Any,
             start, _ = chains_contact(table, parts, chains[0], chains[1], pose, wanted, SURFACES, scratch, row)
             if start < wanted:
                 return 0.0, 0.0, DECIDED
-    pair = Bodies(A, B, chains[0], chains[1], spin_a, spin_b)
+    pair = BodyPair(A, B, chains[0], chains[1], spin_a, spin_b)
     chains_impact(table, parts, pair, window, search, scratch, event[0])
     if event[0].status == CLEAR:
         return inf, inf, DECIDED

@@ -1,4 +1,4 @@
-"""A contact at exactly the contact margin: reported where the error bound allows it, in either order, as README says."""
+"""A contact at exactly the contact margin: reported where the error bound allows it, in either order."""
 
 from __future__ import annotations
 

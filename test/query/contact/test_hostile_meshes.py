@@ -12,7 +12,7 @@ from processor_time import within
 import collision_monitor as cm
 from collision_monitor import Motion, Pose
 from collision_monitor._jit import kernel
-from collision_monitor.impact.body_impact import Bodies, ImpactQuery, Window, chains_impact
+from collision_monitor.impact.body_impact import BodyPair, ImpactQuery, Window, chains_impact
 from collision_monitor.impact.impact_record import CLEAR, IMPACT
 from collision_monitor.meshes.distance.nearest import LEAST, answer_row, tree_distance
 from collision_monitor.meshes.distance.nearest import MEMORY as TREE_MEMORY
@@ -145,7 +145,7 @@ def impact_of(
 ) -> int:
     """Write the impact of two chains; return the number of distance queries."""
     set_pair(table, parts, chains, motion, numbers, 0, numbers, 1)
-    pair = Bodies(motion[0], motion[1], chains[0], chains[1], motion[0].radius, motion[1].radius)
+    pair = BodyPair(motion[0], motion[1], chains[0], chains[1], motion[0].radius, motion[1].radius)
     search = ImpactQuery(0.0, 1e-6, 1000)
     queries: int = chains_impact(table, parts, pair, Window(0.0, 2.0), search, scratch, event[0])
     return queries
