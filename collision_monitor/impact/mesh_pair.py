@@ -29,7 +29,7 @@ from collision_monitor.narrow_phase.contact_row import (
     POINT_B,
     write,
 )
-from collision_monitor.narrow_phase.dispatch import contact_within, mirror
+from collision_monitor.narrow_phase.dispatch import contact_within, is_second, mirror
 from collision_monitor.narrow_phase.pair_pose import swapped
 from collision_monitor.shapes.feature_types import VERTEX
 from collision_monitor.shapes.kinds.box import BOX
@@ -134,7 +134,7 @@ def is_polytope(table, s):
 def _trees_within(table, a, b, pose, limit, out, scratch):
     """`mesh_within` of two shapes by their trees, in the canonical order of the pair tests, and what is known."""
     p = pose.p
-    is_swapped = table.kind[a] > table.kind[b] or (table.kind[a] == table.kind[b] and a > b)
+    is_swapped = is_second(table, a, b, p)
     if is_swapped:
         a, b = b, a
         pose = swapped(pose)

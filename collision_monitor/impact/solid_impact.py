@@ -99,12 +99,9 @@ def solid_impact(table, parts, pair, window, tube, query, ending, scratch):
             soon, examined = leaf_solid_time(blocks, block, solid, gap, enough, memory)
             if not is_early:
                 steps += EXAMINED * examined
-            if is_early and t + soon <= t:
-                return UNRESOLVED, t, 1 + steps // STEPS, gap
-            if soon == 0.0:
-                return HIT, t, 1 + steps // STEPS, 0.0
-            if t + soon <= t:  # the time has no finer resolution
-                return UNRESOLVED, t, 1 + steps // STEPS, 0.0
+            if t + soon <= t:  # or the time has no finer resolution
+                status = HIT if soon == 0.0 and not is_early else UNRESOLVED
+                return status, t, 1 + steps // STEPS, gap if is_early else 0.0
         else:
             soon = _times_of_members(blocks, block, solid, work)
         if child < 0.0 or (soon * speed > keep * size_of(blocks, i, k) and t + soon > t):

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from collision_monitor.checks.numbers import real_array, real_number
 from collision_monitor.errors import PoseError
 from collision_monitor.shapes.matrix_to_pose import matrix_to_pose
+from collision_monitor.shapes.shape import Shape
 from collision_monitor.tolerances import LARGEST_INPUT, NORMALISED, UNIT_QUATERNION
 
 Array = NDArray[np.float64]
@@ -345,6 +346,8 @@ def as_pose(value: Any, name: str) -> Pose:
     except PoseError as error:
         raise PoseError(f"{name}: {error}") from None
     got = f"an array of shape {shape}" if shape else type(value).__name__
+    if isinstance(value, Shape):
+        got += "; each shape is followed by its pose: shape_a, pose_a, shape_b, pose_b"
     raise PoseError(f"{name}: expected a Pose, (x, y, z), 7 numbers x y z qx qy qz qw or a matrix (4, 4), got {got}")
 
 
