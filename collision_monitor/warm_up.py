@@ -141,6 +141,7 @@ def warm_up_functions() -> None:
     from collision_monitor.query.impact.feature_impact import vertex_face_impact
     from collision_monitor.query.impact.time_of_impact import time_of_impact
     from collision_monitor.query.impact.times_of_impact import times_of_impact
+    from collision_monitor.query.points.containment import contains
     from collision_monitor.query.points.points_within import points_within
 
     box, ball = Box((1, 1, 1)), Sphere(0.5)
@@ -157,6 +158,14 @@ def warm_up_functions() -> None:
     contacts(box, poses, ball, poses)
     times_of_impact(box, poses, np.zeros((2, 6)), ball, poses, np.zeros((2, 6)))
     vertex_face_impact(np.arange(24.0).reshape(8, 3))
+    corners = np.vstack([np.zeros(3), np.eye(3)])
+    faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    apart = Mesh(np.vstack([corners, corners + 2.0]), np.vstack([faces, faces + 4]))  # is concave: it gets a tree
+    contains(apart, Pose(), np.full((2, 3), 0.1), test="ray")
+    for place in (Pose((0.2, 0.2, 0.2)), Pose((1.0, 0.0, 0.0)), Pose((5.0, 0.0, 0.0))):
+        for other in (box, ball, apart):
+            contact(apart, Pose(), other, place)
+            time_of_impact(apart, Motion(Pose()), other, Motion(place, (-1, 0, 0)))
 
 
 PARTS: Final = {

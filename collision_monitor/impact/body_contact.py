@@ -119,7 +119,7 @@ def chains_contact(table, parts, first_a, first_b, pose, limit, effort, scratch,
     return best, tests
 
 
-@device
+@outlined
 def chains_overlap(table, parts, first_a, first_b, pose, scratch):
     """Whether two chains have a point in common. Arguments as for `chains_contact`."""
     R_a, R_b, p = scratch.rotation[2], scratch.rotation[3], pose.p

@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import inf
 from typing import Any, Final
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import inlined, outlined
 from collision_monitor.geometry.vector import Vector, cross, dot, minus, opposite, rotate_back
 from collision_monitor.impact.advance import Placed, advance_along_axis
 from collision_monitor.impact.body_impact import AT_REST
@@ -74,7 +74,7 @@ def _turning(table: Any, s: int, R: Any, o: Vector, w: Vector, n: Vector) -> Vec
     return w
 
 
-@device
+@outlined
 def touching_impact(table, parts, pair, window, skin, apart, separation, scratch):
     """What a pair of convex shapes (ShapePair) does that touches at the begin of the window, and when (s).
 

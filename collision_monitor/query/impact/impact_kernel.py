@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device, inlined, kernel
+from collision_monitor._jit import inlined, kernel, outlined
 from collision_monitor._jit.settled import settled
 from collision_monitor.impact.body_contact import RESULT, chains_contact
 from collision_monitor.impact.body_impact import (
@@ -77,7 +77,7 @@ def _round_off(A: Any, B: Any) -> float:
     return GJK_TOUCHING * size
 
 
-@device
+@outlined
 def _first_impact(table: Any, parts: Any, chains: Any, window: Any, search: Any, scratch: Any, moving: Any) -> Any:
     """First impact of two chains (first slots) in a window: lower, upper (s), infinite for none, and a code."""
     motion, event, row = moving
