@@ -27,10 +27,10 @@ from numpy.typing import NDArray
 
 import collision_monitor as cm
 from collision_monitor._jit import kernel
-from collision_monitor.impact.body_impact import ShapePair, contact_at, make_scratch
+from collision_monitor.impact.body_impact import ShapePair, contact_at
 from collision_monitor.motion.motion import relative_position
-from collision_monitor.query.impact.impact_methods import lay_out_motions
-from collision_monitor.query.impact.moving_pair import make_moving_shape
+from collision_monitor.query.impact.impact_kernel import MEMORY, set_pair
+from collision_monitor.query.impact.impact_methods import moving_shapes
 
 Array = NDArray[np.float64]
 Shape = cm.Sphere | cm.Box | cm.Capsule | cm.Cylinder | cm.Cone | cm.ConvexHull | cm.HalfSpace
@@ -68,17 +68,17 @@ def states(rng: np.random.Generator, shape: Shape) -> Array:
 
 @kernel
 def overlaps_before(
-    multibody: Any, pairs: Any, step: float, until: Any, deep: float, scratch: Any, found: Any
+    moving: Any, step: float, until: Any, deep: float, scratch: Any, found: Any
 ) -> None:
     """Write the first sample (s) before `until` (N,) at which each pair is deeper than `deep` (m) into found (N,).
 
     Infinite if there is none.
     """
-    table, parts, bodies = multibody
-    for k in range(len(pairs)):
-        i, j = pairs[k, 0], pairs[k, 1]
-        A, B = bodies.motion[i], bodies.motion[j]
-        pair = ShapePair(A, B, bodies.first_shape[i], bodies.first_shape[j])
+    (table, parts), motion, chains, motions_a, motions_b = moving
+    A, B = motion[0], motion[1]
+    pair = ShapePair(A, B, chains[0], chains[1])
+    for k in range(len(found)):
+        set_pair(table, parts, chains, motion, motions_a, k, motions_b, k)
         speed = math.sqrt((B.vx - A.vx) ** 2 + (B.vy - A.vy) ** 2 + (B.vz - A.vz) ** 2)
         for m in (A, B):
             turning = math.sqrt(m.wx**2 + m.wy**2 + m.wz**2)
@@ -100,12 +100,12 @@ def overlaps_before(
 
 
 @kernel
-def distances(multibody: Any, pairs: Any, times: Any, scratch: Any, found: Any) -> None:
+def distances(moving: Any, times: Any, scratch: Any, found: Any) -> None:
     """Write the signed distances (m) of the pairs at `times` (N,) into found (N,), one time for each pair."""
-    table, parts, bodies = multibody
-    for k in range(len(pairs)):
-        i, j = pairs[k, 0], pairs[k, 1]
-        pair = ShapePair(bodies.motion[i], bodies.motion[j], bodies.first_shape[i], bodies.first_shape[j])
+    (table, parts), motion, chains, motions_a, motions_b = moving
+    pair = ShapePair(motion[0], motion[1], chains[0], chains[1])
+    for k in range(len(found)):
+        set_pair(table, parts, chains, motion, motions_a, k, motions_b, k)
         found[k] = contact_at(table, parts, pair, times[k], scratch)
 
 
@@ -114,13 +114,11 @@ def check(rng: np.random.Generator, kind_a: str, kind_b: str) -> NDArray[np.int_
     a_shape, b_shape = KINDS[kind_a](rng), KINDS[kind_b](rng)
     a, b = states(rng, a_shape), states(rng, b_shape)
     answers = cm.time_of_impact_batch(a_shape, a[:, :7], a[:, 7:], b_shape, b[:, :7], b[:, 7:], HORIZON)
-    still = cm.Motion(cm.Pose())
-    shapes = make_moving_shape(a_shape, still, "A"), make_moving_shape(b_shape, still, "B")
-    multibody, pairs = lay_out_motions(*shapes, a, b, HORIZON)
-    first, apart, scratch = np.empty(BATCH), np.empty(BATCH), make_scratch()
-    overlaps_before(multibody, pairs, STEP, np.minimum(answers.lower, HORIZON + STEP), ROUND_OFF, scratch, first)
+    moving = moving_shapes(a_shape, a, b_shape, b)
+    first, apart, scratch = np.empty(BATCH), np.empty(BATCH), MEMORY.scratch
+    overlaps_before(moving, STEP, np.minimum(answers.lower, HORIZON + STEP), ROUND_OFF, scratch, first)
     hit = answers.status == "hit"
-    distances(multibody, pairs, np.where(hit, answers.upper, 0.0), scratch, apart)
+    distances(moving, np.where(hit, answers.upper, 0.0), scratch, apart)
     return np.array(
         [
             hit.sum(),

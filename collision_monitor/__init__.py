@@ -14,7 +14,7 @@
     query.points.points_within     points_within                         which points of a cloud are near a shape
     query.points.kdop              kdop, Enclosure                       bounding slabs with directions of your own
     query.impact.time_of_impact    time_of_impact, Impact                 time of impact of two shapes, as an interval
-    query.impact.time_of_impact_batch time_of_impact_batch, Impacts          the same for many motions of two shapes
+
     query.impact.feature_impact    vertex_face_impact, edge_edge_impact   the same for features in linear motion
     response                       response.collide, reflect, …           what bodies do when they meet, for simulations
     records                        Model                                  the geometric models of an object
@@ -62,8 +62,8 @@ _HOME = {
     "Decomposition": "objects.convex_decomposition",
     "time_of_impact": "query.impact.time_of_impact",
     "Impact": "query.impact.impact",
-    "time_of_impact_batch": "query.impact.time_of_impact_batch",
-    "Impacts": "query.impact.time_of_impact_batch",
+    "time_of_impact_batch": "query.impact.times_of_impact",
+    "Impacts": "query.impact.times_of_impact",
     "vertex_face_impact": "query.impact.feature_impact",
     "edge_edge_impact": "query.impact.feature_impact",
     "FeatureImpact": "query.impact.feature_impact",
@@ -118,8 +118,8 @@ if TYPE_CHECKING:
     from collision_monitor.query.impact.feature_impact import vertex_face_impact as vertex_face_impact
     from collision_monitor.query.impact.impact import Impact as Impact
     from collision_monitor.query.impact.time_of_impact import time_of_impact as time_of_impact
-    from collision_monitor.query.impact.time_of_impact_batch import Impacts as Impacts
-    from collision_monitor.query.impact.time_of_impact_batch import time_of_impact_batch as time_of_impact_batch
+    from collision_monitor.query.impact.times_of_impact import Impacts as Impacts
+    from collision_monitor.query.impact.times_of_impact import time_of_impact_batch as time_of_impact_batch
     from collision_monitor.query.impact.times_of_impact import times_of_impact as times_of_impact
     from collision_monitor.query.points.containment import contains as contains
     from collision_monitor.query.points.kdop import Enclosure as Enclosure

@@ -17,6 +17,9 @@ UNIT_QUATERNION: Final = 1e-3
 """Largest |norm - 1| of a quaternion that is normalised; the input is refused beyond it.
 Larger: garbage passes as a rotation. Smaller: valid float32 input is refused."""
 
+NORMALISED: Final = 4.0 * EPSILON
+"""Largest |norm - 1| of a quaternion that is left as it is. Smaller: one that was normalised before changes a bit."""
+
 LARGEST_INPUT: Final = 1e18
 """Largest position, velocity or angular velocity (m, m/s, rad/s) of a state, so that squares stay finite and the
 hash grid's cells stay in range. Larger: products overflow and a pair could be lost."""

@@ -22,7 +22,7 @@ from collision_monitor.objects.models import containing_model
 from collision_monitor.records import MOST_POINTS, STATE, Model
 from collision_monitor.settings.profile import NO_BUDGET, NO_LIMIT, Profile
 from collision_monitor.shapes.pose import Motion, Pose
-from collision_monitor.shapes.registry import Box, ConvexHull, Cylinder, Mesh, Points, Shape, Sphere
+from collision_monitor.shapes.registry import Box, ConvexHull, Mesh, Points, Shape, Sphere
 
 Array = NDArray[np.float64]
 
@@ -140,29 +140,32 @@ def warm_up_functions() -> None:
     from collision_monitor.query.contact.overlap import overlap
     from collision_monitor.query.impact.feature_impact import vertex_face_impact
     from collision_monitor.query.impact.time_of_impact import time_of_impact
-    from collision_monitor.query.impact.time_of_impact_batch import time_of_impact_batch
+    from collision_monitor.query.impact.times_of_impact import times_of_impact
+    from collision_monitor.query.points.containment import contains
+    from collision_monitor.query.points.points_within import points_within
 
     box, ball = Box((1, 1, 1)), Sphere(0.5)
     for threads in sorted({1, default_threads()}):
         shapes: list[Shape] = [box, ball] * WORTH_THREADS
         positions = np.arange(3.0 * len(shapes)).reshape(-1, 3)
         Detector(shapes, threads=threads).detect(positions, np.tile([0.0, 0.0, 0.0, 1.0], (len(shapes), 1)))
-    contact(box, Pose(), ball, Pose())
-    contact([(box, Pose())], Pose(), ball, Pose())  # the general search
+    contact(box, Pose(), ball, Pose()).points_a  # noqa: B018 - it is computed when it is read
+    overlap(box, Pose(), ball, Pose())
+    points_within(Points(np.eye(3)), Pose(), ball, Pose())
     time_of_impact(box, Motion(Pose(), angular=(0, 0, 1)), ball, Motion(Pose((3, 0, 0)), acceleration=(-1, 0, 0)))
     time_of_impact(box, Motion(Pose()), box, Motion(Pose((1, 0, 0))))  # they touch
-    poses, twists = np.zeros((2, 7)), np.zeros((2, 6))
-    poses[:, 6] = 1.0
-    contacts(box, poses, ball, poses + np.eye(1, 7))
-    for shape in (box, ball):
-        time_of_impact_batch(shape, poses, twists, shape, poses + np.eye(1, 7), twists)
+    poses = np.array([[0.0, 0, 0, 0, 0, 0, 1], [1.0, 0, 0, 0, 0, 0, 1]])
+    contacts(box, poses, ball, poses)
+    times_of_impact(box, poses, np.zeros((2, 6)), ball, poses, np.zeros((2, 6)))
     vertex_face_impact(np.arange(24.0).reshape(8, 3))
-    corner = Mesh([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], [(0, 1, 2), (0, 1, 3)])
-    for at in (Pose(), Pose((3, 0, 0))):
-        overlap(corner, Pose(), corner, at)
-        contact(corner, Pose(), corner, at)
-        time_of_impact(corner, Motion(Pose()), corner, Motion(at, (-1, 0, 0)))
-    contact(corner, Pose(), Cylinder(0.5, 1), Pose((3, 0, 0)))
+    corners = np.vstack([np.zeros(3), np.eye(3)])
+    faces = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+    apart = Mesh(np.vstack([corners, corners + 2.0]), np.vstack([faces, faces + 4]))  # is concave: it gets a tree
+    contains(apart, Pose(), np.full((2, 3), 0.1), test="ray")
+    for place in (Pose((0.2, 0.2, 0.2)), Pose((1.0, 0.0, 0.0)), Pose((5.0, 0.0, 0.0))):
+        for other in (box, ball, apart):
+            contact(apart, Pose(), other, place)
+            time_of_impact(apart, Motion(Pose()), other, Motion(place, (-1, 0, 0)))
 
 
 PARTS: Final = {

@@ -145,9 +145,9 @@ CHANGE: dict[str, str] = {
 """Data of modules that calls change, with the reason why threads may share it."""
 
 OWN = {
-    "query.contact.convex_pairs.PairMemory": "threading.local",
-    "query.contact.mesh_pairs._Memory": "threading.local",
-    "query.contact.surface_pair._Memory": "threading.local",
+    "query.contact.contact_kernel.QueryMemory": "threading.local",
+    "query.impact.impact_kernel.ImpactMemory": "threading.local",
+    "query.library.Library": "slots of shapes, given and freed under a lock; a kernel reads the arrays of its call",
     "geometry.bounded_cache.BoundedCache": "remembers answers of pure functions, under a lock",
 }
 """Classes of objects in modules that hold what changes, with the reason why threads may share them."""

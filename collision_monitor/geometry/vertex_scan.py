@@ -35,7 +35,7 @@ def _better(builder: Any, value: Any, index: Any, other_value: Any, other_index:
 def farthest_vertex(typing_context: Any, vertices: Any, start: Any, count: Any, dx: Any, dy: Any, dz: Any) -> Any:
     """Index of the first vertex with the greatest d.v among `count` columns of vertices (3, V) from `start` on.
 
-    count is a positive multiple of LANES, to which the shape table pads it.
+    count is a positive multiple of LANES, to which the shape table pads it. The numbers of a row lie side by side.
     """
     signature = types.int64(vertices, types.int64, types.int64, types.float64, types.float64, types.float64)
 
@@ -44,7 +44,8 @@ def farthest_vertex(typing_context: Any, vertices: Any, start: Any, count: Any, 
         start, count = arguments[1], arguments[2]
         direction = [spread(builder, d) for d in arguments[3:]]
         index_type = ir.IntType(64)
-        row_length = cgutils.unpack_tuple(builder, array.shape)[1]
+        row_bytes = cgutils.unpack_tuple(builder, array.strides)[0]  # which a part of a table shares with the table
+        row_length = builder.udiv(row_bytes, index_type(8))
         rows = [
             builder.gep(array.data, [builder.add(start, builder.mul(row_length, index_type(row)))]) for row in range(3)
         ]

@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.impact.body_impact import CLOSING, closing_speed
-from collision_monitor.impact.mesh_pair import shapes_within
+from collision_monitor.impact.mesh_pair import SURFACES, shapes_overlap, shapes_within
 from collision_monitor.motion.bodies import next_pair, place_shape
 from collision_monitor.motion.motion import (
     age_of,
@@ -89,6 +89,52 @@ def move_to_world(bodies, i, now, row):
         row[POINT_B + c] += at
 
 
+@device
+def chains_contact(table, parts, first_a, first_b, pose, limit, effort, scratch, result):
+    """Write the deepest contact of two chains of shapes (`Parts`), if it is at most `limit` (m), into a result row.
+
+    pose: rotations of both bodies, not in scratch.rotation[2:4], and position of B relative to A. effort: see
+    `mesh_within`. The row is about A's origin. Returns (signed distance, infinite for none; number of pair tests). This
+    is the contact of any two bodies: of the monitor, of single queries and of their batches.
+    """
+    R_i, R_j, (px, py, pz) = pose
+    R_a, R_b, out = scratch.rotation[2], scratch.rotation[3], scratch.out
+    best, tests = inf, 0
+    a, b, oa = first_a, first_b, (0.0, 0.0, 0.0)
+    while a >= 0:
+        if b == first_b:
+            oa = place_shape(table, parts, a, R_i, R_a)
+        ob = place_shape(table, parts, b, R_j, R_b)
+        at = PairPose(R_a, R_b, (px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2]))
+        tests += 1
+        if shapes_within(table, a, b, at, min(limit, best), effort, out, scratch) and out[DISTANCE] < best:
+            best = out[DISTANCE]
+            for c in range(3):
+                out[POINT_A + c] += oa[c]
+                out[POINT_B + c] += oa[c]
+            for c in range(CONTACT_SIZE):
+                result[c] = out[c]
+            result[SHAPE_I], result[SHAPE_J] = a, b
+        a, b = next_pair(parts, first_b, a, b)
+    return best, tests
+
+
+@outlined
+def chains_overlap(table, parts, first_a, first_b, pose, scratch):
+    """Whether two chains have a point in common. Arguments as for `chains_contact`."""
+    R_a, R_b, p = scratch.rotation[2], scratch.rotation[3], pose.p
+    a, b, oa = first_a, first_b, (0.0, 0.0, 0.0)
+    while a >= 0:
+        if b == first_b:
+            oa = place_shape(table, parts, a, pose.R_A, R_a)
+        ob = place_shape(table, parts, b, pose.R_B, R_b)
+        at = PairPose(R_a, R_b, (p[0] + ob[0] - oa[0], p[1] + ob[1] - oa[1], p[2] + ob[2] - oa[2]))
+        if shapes_overlap(table, a, b, at, scratch):
+            return True
+        a, b = next_pair(parts, first_b, a, b)
+    return False
+
+
 @outlined
 def body_contact(multibody, i, j, time, query, scratch, result):
     """Write the deepest contact of bodies i and j at `time` (s), from their last states, into a result row.
@@ -98,38 +144,18 @@ def body_contact(multibody, i, j, time, query, scratch, result):
     Returns (touching, number of narrow-phase tests).
     """
     table, parts, bodies = multibody
-    R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
-    out = scratch.out
+    R_i, R_j = scratch.rotation[0], scratch.rotation[1]
     rotation_now(bodies, i, time, scratch.quaternion, R_i)
     rotation_now(bodies, j, time, scratch.quaternion, R_j)
     now = relative_now(bodies, i, j, time)
     px, py, pz = now.p
     widen = widening(now, query.stale_acceleration)
     wanted = query.margin + widen
-    best = inf
-    tests = 0
     reach = bodies.motion[i].radius + bodies.motion[j].radius + wanted
     if px * px + py * py + pz * pz > reach * reach * ROUND_OFF:
         return False, 0
-    a, first_b = bodies.first_shape[i], bodies.first_shape[j]
-    b = first_b
-    oa = (0.0, 0.0, 0.0)
-    while a >= 0:
-        if b == first_b:
-            oa = place_shape(table, parts, a, R_i, R_a)
-        ob = place_shape(table, parts, b, R_j, R_b)
-        pose = PairPose(R_a, R_b, (px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2]))
-        tests += 1
-        limit = min(wanted, best)
-        if shapes_within(table, a, b, pose, limit, out, scratch) and out[DISTANCE] < best:
-            best = out[DISTANCE]
-            for c in range(3):
-                out[POINT_A + c] += oa[c]
-                out[POINT_B + c] += oa[c]
-            for c in range(CONTACT_SIZE):
-                result[c] = out[c]
-            result[SHAPE_I], result[SHAPE_J] = a, b
-        a, b = next_pair(parts, first_b, a, b)
+    a, b = bodies.first_shape[i], bodies.first_shape[j]
+    best, tests = chains_contact(table, parts, a, b, PairPose(R_i, R_j, now.p), wanted, SURFACES, scratch, result)
     if best == inf:
         return False, tests
     result[CLOSING] = closing_now(bodies, i, j, now, result)

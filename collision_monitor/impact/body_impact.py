@@ -24,9 +24,10 @@ from collision_monitor.impact.impact_record import (
     write_pair,
 )
 from collision_monitor.impact.mesh_impact import mesh_impact
-from collision_monitor.impact.mesh_pair import has_mesh, shapes_within, triangles_contact
+from collision_monitor.impact.mesh_pair import SURFACES, has_mesh, shapes_within, triangles_contact
 from collision_monitor.impact.overlap_time import overlap_time
 from collision_monitor.impact.sphere_interval import meeting_of_spheres, relative_motion_at, sphere_interval
+from collision_monitor.impact.tree_impact import FULL
 from collision_monitor.meshes.distance.nearest import MEMORY, PLACE_A, PLACE_B, answer_row
 from collision_monitor.motion.bodies import next_pair, place_shape
 from collision_monitor.motion.motion import half_acceleration, relative_position, relative_velocity, rotation_at
@@ -134,7 +135,7 @@ def shape_impact(table, parts, pair, window, tube, query, scratch):
     """
     A, B, a, b = pair
     if has_mesh(table, a, b):
-        return mesh_impact(table, parts, pair, window, tube, query, scratch)
+        return mesh_impact(table, parts, pair, window, tube, query, FULL, scratch)
     begin, end = window
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
@@ -206,7 +207,7 @@ def _contact_at(table, parts, pair, t, places, scratch):
     if places[0] >= 0:
         triangles_contact(table, a, b, pose, places, out)
     else:
-        shapes_within(table, a, b, pose, inf, out, scratch)
+        shapes_within(table, a, b, pose, inf, SURFACES, out, scratch)
     for k in range(3):
         out[POINT_A + k] += oa[k]
         out[POINT_B + k] += oa[k]
@@ -261,7 +262,7 @@ def _certain_overlap(table, parts, pair, start, guess, places, window, tube, que
 
 
 @outlined
-def _first_overlap(table, parts, pair, near, window, tube, query, scratch):
+def first_overlap(table, parts, pair, near, window, tube, query, scratch):
     """Return a time at which a pair of shapes certainly overlaps, infinite for none, and that of the contact found.
 
     near: what `shape_impact` found: status, time, guess, and places as for `_contact_at`. The contact in scratch.out is
@@ -289,19 +290,46 @@ def tube_of(A, B, begin):
     )
 
 
+class BodyPair(NamedTuple):
+    """Two bodies as a search of their impact sees them: their motions (MOTION), first shapes and spin radii (m)."""
+
+    A: Any
+    B: Any
+    first_a: Any
+    first_b: Any
+    spin_a: Any
+    spin_b: Any
+
+
 @device
 def body_impact(multibody, i, j, window, query, scratch, event):
     """Write the first impact of bodies i and j in the window into the IMPACT record `event`.
 
-    event.status = CLEAR if there is none. Bodies that overlap, or are within query.margin, at the begin have their
+    event.status = CLEAR if there is none. BodyPair that overlap, or are within query.margin, at the begin have their
     impact there. The reference motions and their tubes are those in `bodies`; in the record, i is the body with the
     smaller id. Returns the number of distance queries.
     """
     table, parts, bodies = multibody
-    begin, end = window
     if bodies.id[i] > bodies.id[j]:
         i, j = j, i
-    A, B = bodies.motion[i], bodies.motion[j]
+    pair = BodyPair(
+        bodies.motion[i], bodies.motion[j], bodies.first_shape[i], bodies.first_shape[j],
+        bodies.spin_radius[i], bodies.spin_radius[j],
+    )  # fmt: skip
+    queries = chains_impact(table, parts, pair, window, query, scratch, event)
+    if event.status != CLEAR:
+        write_pair(bodies, i, j, event)
+    return queries
+
+
+@device
+def chains_impact(table, parts, pair, window, query, scratch, event):
+    """`body_impact` of two chains of shapes (`BodyPair`), without what names the bodies in the record.
+
+    This is the impact of any two bodies: of the monitor, of single queries and of their batches.
+    """
+    A, B, a, first_b, spin_a, spin_b = pair
+    begin, end = window
     event.status = CLEAR
     tube = tube_of(A, B, begin)
     approach = relative_motion_at(A, B, begin)
@@ -313,10 +341,8 @@ def body_impact(multibody, i, j, window, query, scratch, event):
         first, last = sphere_interval(approach.p, approach.v, reach + tube.start, tube.growth + bent, last, 1.0)
         if first > last:
             return 0
-    write_pair(bodies, i, j, event)
-    a, first_b = bodies.first_shape[i], bodies.first_shape[j]
     b = first_b
-    if bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0 and reach < inf and bent == 0.0:
+    if spin_a == 0.0 and spin_b == 0.0 and reach < inf and bent == 0.0:
         _sphere_impact(ShapePair(A, B, a, b), approach, reach, tube, window, first, event)
         return 1
     event.method = CONSERVATIVE_ADVANCEMENT
@@ -325,9 +351,9 @@ def body_impact(multibody, i, j, window, query, scratch, event):
     there = Tube(tube.start + tube.growth * first, tube.growth)
     lower, guess, places = inf, 0.0, NO_PLACES
     while a >= 0:
-        pair = ShapePair(A, B, a, b)
+        shapes = ShapePair(A, B, a, b)
         scratch.answer[PLACE_A] = -1.0
-        status, t, n, soon = shape_impact(table, parts, pair, Window(start, stop), there, query, scratch)
+        status, t, n, soon = shape_impact(table, parts, shapes, Window(start, stop), there, query, scratch)
         queries += n
         if status != CLEAR and t < lower:
             lower, guess, places = t, soon, (int(scratch.answer[PLACE_A]), int(scratch.answer[PLACE_B]))
@@ -337,9 +363,9 @@ def body_impact(multibody, i, j, window, query, scratch, event):
         a, b = next_pair(parts, first_b, a, b)
     if event.status == CLEAR:
         return queries
-    pair = ShapePair(A, B, event.shape_i, event.shape_j)
+    shapes = ShapePair(A, B, event.shape_i, event.shape_j)
     near = event.status, lower, guess, places
-    sure, seen = _first_overlap(table, parts, pair, near, window, tube, query, scratch)
+    sure, seen = first_overlap(table, parts, shapes, near, window, tube, query, scratch)
     event.lower, event.upper = lower, sure
     event.status = HIT if sure < inf else UNRESOLVED
     _set_geometry(event, A, seen, scratch.out)

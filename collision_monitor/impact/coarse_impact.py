@@ -1,6 +1,6 @@
 """First impacts of meshes that are not due yet: only until when their boxes stay apart (`mesh_impact_tolerance`).
 
-The search of tree_impact.py or solid_impact.py, ended as soon as boxes are so small and so near that their triangles
+The search of mesh_impact.py, ended as soon as boxes are so small and so near that their triangles
 are within a gap of some cm. The lower end is as certain as that of a full search. A collision is certain if triangles
 meet at one of a few later times; else the upper end is open. Pairs that are due are searched again from there, with a
 gap of at least the motion in a step.
@@ -17,9 +17,7 @@ from collision_monitor._jit import device, inlined, kernel, outlined
 from collision_monitor._jit.direct import direct
 from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.geometry.vector import dot
-from collision_monitor.impact.body_impact import ShapePair, Tube, body_impact, closing_speed, tube_of
-from collision_monitor.impact.coarse_solid import solid_near, solid_overlaps
-from collision_monitor.impact.coarse_trees import TOO_MANY, SearchEnd, pose_at, trees_near, trees_overlap
+from collision_monitor.impact.body_impact import ShapePair, Tube, Window, body_impact, closing_speed, tube_of
 from collision_monitor.impact.impact_record import (
     BOUND_ONLY,
     CLEAR,
@@ -28,12 +26,15 @@ from collision_monitor.impact.impact_record import (
     UNRESOLVED,
     write_pair,
 )
-from collision_monitor.impact.mesh_pair import enclosure, has_mesh, have_trees, is_mesh
+from collision_monitor.impact.mesh_impact import mesh_impact
+from collision_monitor.impact.mesh_pair import SURFACES, has_mesh, shapes_within
 from collision_monitor.impact.pair_impacts import PREFETCH_AHEAD, window_of
 from collision_monitor.impact.sphere_interval import meeting_of_spheres, relative_motion_at, sphere_interval
-from collision_monitor.meshes.overlap.inside import OUTSIDE
+from collision_monitor.impact.tree_impact import SearchEnd, tree_approach_at
+from collision_monitor.motion.bodies import place_shape
 from collision_monitor.motion.motion import half_acceleration, relative_position, relative_velocity
-from collision_monitor.narrow_phase.contact_row import NORMAL, POINT_A, POINT_B
+from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B
+from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.shapes.kinds.half_space import HALF_SPACE
 
 TRIES: Final = (1.5, 4.0)
@@ -54,19 +55,19 @@ def _write_hit(pair, t, event, out):
     event.closing_speed = closing_speed(v, (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz), p, out)
 
 
-@inlined
-def _near(table, parts, pair, now, window, tube, query, near, scratch):
-    if have_trees(table, pair.a, pair.b):
-        return trees_near(table, parts, pair, now, window, tube, query, near, scratch)
-    ordered = (pair.A, pair.B, pair.a, pair.b) if is_mesh(table, pair.a) else (pair.B, pair.A, pair.b, pair.a)
-    return solid_near(table, parts, ordered, now, window, tube, query, near, scratch)
-
-
-@inlined
-def _overlap(table, parts, pair, t, allowed, scratch):
-    if have_trees(table, pair.a, pair.b):
-        return trees_overlap(table, parts, pair, t, allowed, scratch)
-    return solid_overlaps(table, parts, pair, t, allowed, scratch)
+@device
+def _overlaps(table, parts, pair, t, allowed, scratch):
+    """Whether shapes overlap at time t (s) by more than `allowed` (m); then scratch.out has the contact about A."""
+    out = scratch.out
+    p, _ = tree_approach_at(table, parts, pair, t, 0.0, 0.0, t, scratch)
+    pose = PairPose(scratch.rotation[2], scratch.rotation[3], p)
+    if not shapes_within(table, pair.a, pair.b, pose, -allowed, SURFACES, out, scratch):
+        return False
+    offset = place_shape(table, parts, pair.a, scratch.rotation[0], scratch.rotation[2])
+    for c in range(3):
+        out[POINT_A + c] += offset[c]
+        out[POINT_B + c] += offset[c]
+    return out[DISTANCE] + out[BOUND] + allowed <= 0.0
 
 
 @inlined
@@ -79,11 +80,11 @@ def _together(A, B, window, margin):
 
 
 @outlined
-def coarse_impact(multibody, i, j, window, query, near, scratch, event):
+def coarse_impact(multibody, i, j, window, query, ending, scratch, event):
     """Write a bound on the first impact of two bodies with `has_bounds` into the IMPACT record `event`.
 
-    event.status = CLEAR if there is none. Returns False if only a full search can tell, for example if one of the
-    bodies may be inside the other. near: Nearness; the radius of the smaller body limits its gap too.
+    event.status = CLEAR if there is none. Returns False if only a full search can tell, because one of the bodies is
+    inside the other. ending: SearchEnd; the radius of the smaller body limits its gap too.
     """
     table, parts, bodies = multibody
     begin = window.begin
@@ -96,15 +97,12 @@ def coarse_impact(multibody, i, j, window, query, near, scratch, event):
     if first > last:
         return True
     pair = ShapePair(A, B, bodies.first_shape[i], bodies.first_shape[j])
-    start, stop, near = begin + first, begin + last, SearchEnd(min(near.tolerance, A.radius, B.radius), near.period)
+    start, stop = begin + first, begin + last
+    near = SearchEnd(min(ending.tolerance, A.radius, B.radius), ending.period, begin)
     there = Tube(tube.start + tube.growth * first, tube.growth)
-    lower, status, gap = _near(table, parts, pair, begin, (start, stop), there, query, near, scratch)
-    if status == TOO_MANY:
+    status, lower, _, gap = mesh_impact(table, parts, pair, Window(start, stop), there, query, near, scratch)
+    if status == HIT:  # one is in the other
         return False
-    if lower > start or status == CLEAR:
-        pose = pose_at(table, parts, pair, start, scratch)
-        if enclosure(table, pair.a, pair.b, pose, scratch) != OUTSIDE:
-            return False
     if status == CLEAR:
         return True
     write_pair(bodies, i, j, event)
@@ -115,7 +113,7 @@ def coarse_impact(multibody, i, j, window, query, near, scratch, event):
     for ahead in TRIES:
         t = lower + ahead * gap / speed if speed > 0.0 else inf
         allowed = tube.start + tube.growth * (t - begin) - query.margin
-        if t <= stop and _overlap(table, parts, pair, t, allowed, scratch):
+        if t <= stop and _overlaps(table, parts, pair, t, allowed, scratch):
             _write_hit(pair, t, event, scratch.out)
             return True
     meeting_of_spheres(A, B, approach, begin, lower - begin, event)
@@ -138,8 +136,8 @@ def has_bounds(multibody, i, j):
 
 @direct
 @kernel
-def predict_coarsely(multibody, pairs, now, query, near, events, scratch):
-    """As `predict_pairs`, but with bounds on the impacts of pairs with `has_bounds`. near: Nearness."""
+def predict_coarsely(multibody, pairs, now, query, ending, events, scratch):
+    """As `predict_pairs`, but with bounds on the impacts of pairs with `has_bounds`. ending: SearchEnd."""
     bodies = multibody.bodies
     n = queries = 0
     for k in range(pairs.shape[0]):
@@ -156,7 +154,7 @@ def predict_coarsely(multibody, pairs, now, query, near, events, scratch):
             if first > last:
                 continue
             queries += 1
-            is_known = coarse_impact(multibody, i, j, window, query, near, scratch, events[n])
+            is_known = coarse_impact(multibody, i, j, window, query, ending, scratch, events[n])
         if not is_known:
             queries += body_impact(multibody, i, j, window, query, scratch, events[n])
         if events[n].status != CLEAR:

@@ -13,15 +13,18 @@ from collision_monitor.narrow_phase.pair_pose import PairPose
 
 
 @device
-def mesh_impact(table, parts, pair, window, tube, query, scratch):
-    """`shape_impact` of a pair (ShapePair) with a mesh or a cloud; one that is in the other has its impact at once."""
+def mesh_impact(table, parts, pair, window, tube, query, ending, scratch):
+    """`shape_impact` of a pair (ShapePair) with a mesh or a cloud; one that is in the other has its impact at once.
+
+    ending: when the search ends early, see `tree_impact`.
+    """
     if have_trees(table, pair.a, pair.b):
-        status, t, queries, guess = tree_impact(table, parts, pair, window, tube, query, scratch)
+        status, t, queries, guess = tree_impact(table, parts, pair, window, tube, query, ending, scratch)
     elif is_mesh(table, pair.a):
-        status, t, queries, guess = solid_impact(table, parts, pair, window, tube, query, scratch)
+        status, t, queries, guess = solid_impact(table, parts, pair, window, tube, query, ending, scratch)
     else:
         swapped = (pair.B, pair.A, pair.b, pair.a)
-        status, t, queries, guess = solid_impact(table, parts, swapped, window, tube, query, scratch)
+        status, t, queries, guess = solid_impact(table, parts, swapped, window, tube, query, ending, scratch)
     if t > window.begin or status == CLEAR:
         where = _enclosure_at(table, parts, pair, window.begin, scratch)
         if where != OUTSIDE:

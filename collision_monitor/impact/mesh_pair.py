@@ -6,7 +6,7 @@ from math import inf, sqrt
 
 from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.geometry.vector import along, dot, minus, opposite, rotate, rotate_back, sum_of_sizes
-from collision_monitor.meshes.distance.contact import FARTHER, OPEN, tree_contact
+from collision_monitor.meshes.distance.contact import APART, FARTHER, OPEN, tree_contact
 from collision_monitor.meshes.distance.feature import (
     feature_in_triangle,
     number_in_hull,
@@ -17,7 +17,7 @@ from collision_monitor.meshes.distance.nearest import PLACE_A, PLACE_B, nearest_
 from collision_monitor.meshes.distance.solid import SolidMemory, solid_contact
 from collision_monitor.meshes.layout import CLOSED, FACE, MOST_PARTS, PARTS, WIDTH
 from collision_monitor.meshes.overlap.inside import INSIDE, OUTSIDE, is_either_in, locate_in_surface
-from collision_monitor.meshes.overlap.touching_triangles import contact_of_places
+from collision_monitor.meshes.overlap.touching_triangles import contact_of_places, touching_triangles
 from collision_monitor.meshes.placing import inverse, relative
 from collision_monitor.narrow_phase.contact_row import (
     BOUND,
@@ -29,15 +29,20 @@ from collision_monitor.narrow_phase.contact_row import (
     POINT_B,
     write,
 )
-from collision_monitor.narrow_phase.dispatch import contact_within, mirror
+from collision_monitor.narrow_phase.dispatch import contact_within, is_second, mirror
 from collision_monitor.narrow_phase.pair_pose import swapped
 from collision_monitor.shapes.feature_types import VERTEX
+from collision_monitor.shapes.kinds.box import BOX
 from collision_monitor.shapes.kinds.convex_hull import CONVEX_HULL
 from collision_monitor.shapes.kinds.half_space import HALF_SPACE
 from collision_monitor.shapes.kinds.mesh import MESH
 from collision_monitor.shapes.kinds.points import POINTS
 from collision_monitor.shapes.shape_table import TREE
 from collision_monitor.tolerances import FEATURE_TIE, SAT_ROUND_OFF
+
+SURFACES, SOLIDS = range(2)
+"""What a search of a pair with a mesh has to tell of an overlap: how deep the surfaces are in each other; or how deep
+the triangles are in the other solid, if that is convex, which is deeper and takes longer."""
 
 
 @inlined
@@ -106,55 +111,81 @@ def enclosure(table, a, b, pose, scratch):
 
 
 @outlined
-def mesh_within(table, a, b, pose, limit, out, scratch):
+def mesh_within(table, a, b, pose, limit, effort, out, scratch):
     """Whether the distance of two shapes with trees, or of one and a solid, is at most `limit` (m); writes the contact.
 
-    The pair is brought into the canonical order of the pair tests. If they overlap, the depth is that of the deepest
-    pair of triangles or points; a translation that parts them may be longer.
+    If they overlap, the depth is that of the deepest pair of triangles or points; a translation that parts them may be
+    longer. effort: SURFACES or SOLIDS.
     """
-    kind_a, kind_b, p = table.kind[a], table.kind[b], pose.p
-    are_trees = have_trees(table, a, b)
-    is_swapped = (kind_a > kind_b or (kind_a == kind_b and a > b)) if are_trees else not is_mesh(table, a)
+    if have_trees(table, a, b):
+        found, known = _trees_within(table, a, b, pose, limit, out, scratch)
+        if effort != SOLIDS or known == FARTHER or known == APART or is_polytope(table, a) == is_polytope(table, b):
+            return found
+    return _solid_within(table, a, b, pose, limit, out, scratch)
+
+
+@inlined
+def is_polytope(table, s):
+    """Whether a shape is a convex polytope."""
+    return table.kind[s] == BOX or table.kind[s] == CONVEX_HULL
+
+
+@device
+def _trees_within(table, a, b, pose, limit, out, scratch):
+    """`mesh_within` of two shapes by their trees, in the canonical order of the pair tests, and what is known."""
+    p = pose.p
+    is_swapped = is_second(table, a, b, p)
     if is_swapped:
         a, b = b, a
         pose = swapped(pose)
     margins = table.margin[a] + table.margin[b]
-    if are_trees:
-        answer, work = scratch.answer, scratch.tree
-        answer[PLACE_A] = answer[PLACE_B] = -1.0
-        first, second = root_of(table, a), root_of(table, b)
-        known = tree_contact(table.blocks, first, table.blocks, second, pose, limit + margins, out, answer, work)
-        if known == FARTHER:
-            return False
-        out[DISTANCE] -= margins
-        for c in range(3):
-            out[POINT_A + c] += table.margin[a] * out[NORMAL + c]
-            out[POINT_B + c] = out[POINT_A + c] + out[DISTANCE] * out[NORMAL + c]
-        if known == OPEN:  # one may be inside the other, at any depth
+    answer, work = scratch.answer, scratch.tree
+    answer[PLACE_A] = answer[PLACE_B] = -1.0
+    first, second = root_of(table, a), root_of(table, b)
+    known = tree_contact(table.blocks, first, table.blocks, second, pose, limit + margins, out, answer, work)
+    if known == FARTHER:
+        return False, known
+    out[DISTANCE] -= margins
+    for c in range(3):
+        out[POINT_A + c] += table.margin[a] * out[NORMAL + c]
+        out[POINT_B + c] = out[POINT_A + c] + out[DISTANCE] * out[NORMAL + c]
+    if known == OPEN:  # one may be inside the other, at any depth
+        out[BOUND] += table.radius[a] + table.radius[b] + sqrt(dot(p, p))
+    elif not out[DISTANCE] - out[BOUND] <= limit:
+        return False, known
+    n = out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]
+    n_a, n_b = rotate_back(pose.R_A, n), rotate_back(pose.R_B, opposite(n))
+    on_a = out[POINT_A], out[POINT_A + 1], out[POINT_A + 2]
+    on_b = minus((out[POINT_B], out[POINT_B + 1], out[POINT_B + 2]), pose.p)
+    _name_feature(table, a, answer[PLACE_A], rotate_back(pose.R_A, on_a), n_a, out, 0)
+    _name_feature(table, b, answer[PLACE_B], rotate_back(pose.R_B, on_b), n_b, out, 1)
+    if is_swapped:
+        mirror(out, p)
+    return True, known
+
+
+@device
+def _solid_within(table, a, b, pose, limit, out, scratch):
+    """`mesh_within` of a tree and a convex solid."""
+    p = pose.p
+    is_swapped = not is_mesh(table, a)
+    if is_swapped:
+        a, b = b, a
+        pose = swapped(pose)
+    memory = SolidMemory(scratch.triangle, scratch.work, scratch.tree)
+    found = solid_contact(table.blocks, root_of(table, a), table.margin[a], table, b, pose, limit, out, memory)
+    where = OUTSIDE if found and out[DISTANCE] <= 0.0 else enclosure(table, a, b, pose, scratch)
+    if where != OUTSIDE:
+        if not found:
+            solid_contact(table.blocks, root_of(table, a), table.margin[a], table, b, pose, inf, out, memory)
+        if where == INSIDE:
+            out[DISTANCE] = -out[DISTANCE]
+            for c in range(3):
+                out[NORMAL + c] = -out[NORMAL + c]
+        else:
             out[BOUND] += table.radius[a] + table.radius[b] + sqrt(dot(p, p))
-        if known != OPEN and not out[DISTANCE] <= limit:
-            return False
-        n = out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]
-        n_a, n_b = rotate_back(pose.R_A, n), rotate_back(pose.R_B, opposite(n))
-        on_a = out[POINT_A], out[POINT_A + 1], out[POINT_A + 2]
-        on_b = minus((out[POINT_B], out[POINT_B + 1], out[POINT_B + 2]), pose.p)
-        _name_feature(table, a, answer[PLACE_A], rotate_back(pose.R_A, on_a), n_a, out, 0)
-        _name_feature(table, b, answer[PLACE_B], rotate_back(pose.R_B, on_b), n_b, out, 1)
-    else:
-        memory = SolidMemory(scratch.triangle, scratch.work, scratch.tree)
-        found = solid_contact(table.blocks, root_of(table, a), table.margin[a], table, b, pose, limit, out, memory)
-        where = OUTSIDE if found and out[DISTANCE] <= 0.0 else enclosure(table, a, b, pose, scratch)
-        if where != OUTSIDE:
-            if not found:
-                solid_contact(table.blocks, root_of(table, a), table.margin[a], table, b, pose, inf, out, memory)
-            if where == INSIDE:
-                out[DISTANCE] = -out[DISTANCE]
-                for c in range(3):
-                    out[NORMAL + c] = -out[NORMAL + c]
-            else:
-                out[BOUND] += table.radius[a] + table.radius[b] + sqrt(dot(p, p))
-        elif not found:
-            return False
+    elif not found:
+        return False
     if is_swapped:
         mirror(out, p)
     return True
@@ -193,8 +224,20 @@ def triangles_contact(table, a, b, pose, places, out):
 
 
 @inlined
-def shapes_within(table, a, b, pose, limit, out, scratch):
-    """`contact_within` of any two shapes, meshes included."""
+def shapes_within(table, a, b, pose, limit, effort, out, scratch):
+    """`contact_within` of any two shapes, meshes included; effort: see `mesh_within`."""
     if has_mesh(table, a, b):
-        return mesh_within(table, a, b, pose, limit, out, scratch)
+        return mesh_within(table, a, b, pose, limit, effort, out, scratch)
     return contact_within(table, a, b, pose, limit, out, scratch.work)
+
+
+@device
+def shapes_overlap(table, a, b, pose, scratch):
+    """Whether two shapes have a point in common, of an open mesh on its surface; meshes whose test is too long may."""
+    if has_mesh(table, a, b) and have_trees(table, a, b) and table.margin[a] + table.margin[b] == 0.0:
+        X, blocks, work = relative(pose.R_A, pose.R_B, pose.p), table.blocks, scratch.tree
+        first, second = root_of(table, a), root_of(table, b)
+        if not touching_triangles(blocks, first, blocks, second, X, 1, work)[1]:
+            return True
+        return is_either_in(blocks, first, blocks, second, X, 0.0, work) != OUTSIDE
+    return shapes_within(table, a, b, pose, 0.0, SURFACES, scratch.out, scratch) and scratch.out[DISTANCE] <= 0.0

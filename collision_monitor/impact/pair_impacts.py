@@ -10,11 +10,9 @@ import numpy as np
 from collision_monitor._jit import inlined, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor._jit.prefetch import prefetch
-from collision_monitor.impact.body_impact import ShapePair, Tube, Window, body_impact, tube_of
+from collision_monitor.impact.body_impact import Window, body_impact, tube_of
 from collision_monitor.impact.impact_record import BOUND_ONLY, CLEAR, UNRESOLVED, write_pair
-from collision_monitor.impact.overlap_time import overlap_time
 from collision_monitor.impact.sphere_interval import meeting_of_spheres, relative_motion_at, sphere_interval
-from collision_monitor.motion.bodies import next_pair
 from collision_monitor.motion.motion import half_acceleration
 
 PREFETCH_AHEAD: Final = 4
@@ -122,17 +120,3 @@ def refine(multibody, bounds, now, query, events, scratch):
         if events[n].status != CLEAR:
             n += 1
     return n, queries
-
-
-@kernel
-def bodies_overlap_time(multibody, horizon, query, scratch):
-    """Least `overlap_time` (s) in [0, horizon] of the pairs of shapes of bodies 0 and 1; infinite: none found."""
-    table, parts, bodies = multibody
-    a, first_b = bodies.first_shape[0], bodies.first_shape[1]
-    b, best = first_b, inf
-    while a >= 0:
-        pair = ShapePair(bodies.motion[0], bodies.motion[1], a, b)
-        window = Window(0.0, horizon)
-        best = overlap_time(table, parts, pair, (0.0, best), window, Tube(0.0, 0.0), query, scratch)
-        a, b = next_pair(parts, first_b, a, b)
-    return best

@@ -10,7 +10,7 @@ Hubbard, Collision detection for interactive graphics applications, 1995: a heap
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Final
+from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.geometry.vector import cross, dot, minus, plus, rotate_back
@@ -20,8 +20,8 @@ from collision_monitor.meshes.advance.box_times import box_times
 from collision_monitor.meshes.advance.leaf_times import leaf_time
 from collision_monitor.meshes.distance.contact import reach_in
 from collision_monitor.meshes.distance.nearest import BOUNDS, MOST_PAIRS, PAIRS, PLACE_A, PLACE_B, opens_b, size_of
-from collision_monitor.meshes.layout import CHILD, WIDTH
-from collision_monitor.meshes.placing import inverse, relative
+from collision_monitor.meshes.layout import CENTER, CHILD, HALF, WIDTH
+from collision_monitor.meshes.placing import inverse, place_point, relative
 from collision_monitor.motion.bodies import place_shape
 from collision_monitor.motion.motion import relative_position, relative_velocity, rotation_at
 from collision_monitor.shapes.shape_table import TREE
@@ -57,6 +57,54 @@ HEAP: Final = 2 * MOST_PAIRS // ENTRY
 
 LEAST_DURATION: Final = 1e-300
 """s: least duration of a search."""
+
+KEEP_EARLY: Final = 1.0
+"""KEEP of a search that ends early, whose steps are long."""
+
+SHARE: Final = 0.2
+"""Largest gap at which a search ends early, as a part of the distance that the bodies move until then."""
+
+DUE: Final = 1.0
+"""Gap at which the search of a pair that is due ends, as a part of the distance that the bodies move in a step."""
+
+
+class SearchEnd(NamedTuple):
+    """How near two bodies have to be, so that their search ends early: until then they are only known to be apart."""
+
+    tolerance: Any  # m: largest gap; 0: the search is a full one
+    period: Any  # s since the step before
+    now: Any  # s: time of the step
+
+    @property
+    def is_allowed(self) -> bool:
+        """Whether searches may end early."""
+        return bool(self.tolerance > 0.0)
+
+
+FULL: Final = SearchEnd(0.0, 0.0, 0.0)
+"""A search that ends with the impact."""
+
+
+@inlined
+def ending_gap(ending, speed, t, query):
+    """Gap (m) at which a search ends at time t (s), for bodies of a relative speed (m/s)."""
+    near = speed * max(SHARE * (t - ending.now), DUE * ending.period)
+    return max(min(ending.tolerance, near), query.tolerance)
+
+
+@inlined
+def steps_of(A, B, duration, query, ending):
+    """Most boxes that a search of a duration (s) examines. It knows then until when the bodies are apart."""
+    if ending.tolerance > 0.0:
+        return STEPS
+    return query.iterations * STEPS // (FEWER_STEPS if spins(A, B, duration) else 1)
+
+
+@inlined
+def box_radius(blocks, block, member):
+    """Half of the diagonal of a box (m)."""
+    x, y, z = blocks[block, HALF, member], blocks[block, HALF + 1, member], blocks[block, HALF + 2, member]
+    return sqrt(x * x + y * y + z * z)
 
 
 @inlined
@@ -174,15 +222,19 @@ def open_box(blocks, box_a, box_b, X, move, work):
 
 
 @outlined
-def tree_impact(table, parts, pair, window, tube, query, scratch):
-    """`shape_impact` of two shapes with trees; scratch.answer then has the places of the triangles that meet."""
+def tree_impact(table, parts, pair, window, tube, query, ending, scratch):
+    """`shape_impact` of two shapes with trees; scratch.answer then has the places of the triangles that meet.
+
+    A search that ends early (SearchEnd) ends, UNRESOLVED, as soon as two boxes are so small and so near that their
+    triangles are within its gap; the gap (m) is in place of the guess.
+    """
     begin, end = times_of(window)
     blocks, work, answer = table.blocks, scratch.tree, scratch.answer
     root_a, root_b = int(table.size[pair.a, TREE]) - 1, int(table.size[pair.b, TREE]) - 1
     place_a, place_b = float(WIDTH * root_a), float(WIDTH * root_b)
-    start, most = begin, query.iterations * STEPS
-    if spins(pair.A, pair.B, end - begin):
-        most //= FEWER_STEPS
+    start, most = begin, steps_of(pair.A, pair.B, end - begin, query, ending)
+    is_early, gap = ending.tolerance > 0.0, query.tolerance
+    keep = KEEP_EARLY if is_early else KEEP
     waiting, steps, later = push_pair(work, 0, begin, place_a, place_b, -1.0), 0, end
     now, speed = -inf, inf
     while True:
@@ -196,7 +248,7 @@ def tree_impact(table, parts, pair, window, tube, query, scratch):
         waiting = pop_first(work, waiting)
         steps += 1
         if steps > most:
-            return UNRESOLVED, t, 1 + steps // STEPS, 0.0
+            return UNRESOLVED, t, 1 + steps // STEPS, gap
         a, i, b, j = int(place_a) // WIDTH, int(place_a) % WIDTH, int(place_b) // WIDTH, int(place_b) % WIDTH
         child_a, child_b = blocks[a, CHILD, i], blocks[b, CHILD, j]
         is_leaf = child_a < 0.0 and child_b < 0.0
@@ -209,15 +261,23 @@ def tree_impact(table, parts, pair, window, tube, query, scratch):
             X = relative(scratch.rotation[2], scratch.rotation[3], p)
             speed = sqrt(dot(move.v, move.v)) + move.growth
             speed += sqrt(move.bend_a) * reach_in(blocks, root_a) + sqrt(move.bend_b) * reach_in(blocks, root_b)
+        if is_early:
+            gap = ending_gap(ending, speed, t, query)
+            c = place_point(X, (blocks[b, CENTER, j], blocks[b, CENTER + 1, j], blocks[b, CENTER + 2, j]))
+            w = c[0] - blocks[a, CENTER, i], c[1] - blocks[a, CENTER + 1, i], c[2] - blocks[a, CENTER + 2, i]
+            if sqrt(dot(w, w)) + box_radius(blocks, a, i) + box_radius(blocks, b, j) <= gap + move.start:
+                return UNRESOLVED, t, 1 + steps // STEPS, gap
         if is_leaf:
             leaf_a, leaf_b = root_a - int(child_a), root_b - int(child_b)
             d, triangles = leaf_time(
-                blocks, int(place_a), leaf_a, blocks, int(place_b), leaf_b, X, move, query.tolerance,
-                KEEP * size / speed, triangles, work,
+                blocks, int(place_a), leaf_a, blocks, int(place_b), leaf_b, X, move, gap,
+                keep * size / speed, triangles, work,
             )  # fmt: skip
             if now < t and not now + d > t:  # looked at too early: again at its own time
                 waiting, now = push_pair(work, waiting, t, place_a, place_b, float(triangles)), -inf
                 continue
+            if is_early and now + d <= t:
+                return UNRESOLVED, t, 1 + steps // STEPS, gap
             if d == 0.0:
                 answer[PLACE_A] = WIDTH * leaf_a + triangles // WIDTH
                 answer[PLACE_B] = WIDTH * leaf_b + triangles % WIDTH
@@ -228,7 +288,7 @@ def tree_impact(table, parts, pair, window, tube, query, scratch):
                 waiting = push_pair(work, waiting, now + d, place_a, place_b, float(triangles))
             continue
         in_b, block, size, soon = open_box(blocks, (root_a, a, i, child_a), (root_b, b, j, child_b), X, move, work)
-        if soon * speed > KEEP * size and now + soon > t:  # else the time has no finer resolution
+        if soon * speed > keep * size and now + soon > t:  # else the time has no finer resolution
             if now + soon < end:
                 waiting = push_pair(work, waiting, now + soon, place_a, place_b, -1.0)
             continue

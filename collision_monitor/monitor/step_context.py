@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.impact.body_contact import ContactQuery
 from collision_monitor.impact.body_impact import ImpactQuery
-from collision_monitor.impact.coarse_trees import SearchEnd
+from collision_monitor.impact.tree_impact import SearchEnd
 from collision_monitor.monitor.result import Work
 from collision_monitor.monitor.state.roster import Roster
 from collision_monitor.settings.by_name import classes_of
@@ -76,7 +76,7 @@ class StepContext:
         """Gap to which impacts of meshes are only bounded. 0: all are exact, as those of uncertain states are."""
         p = self.profile
         exact = p.uncertainty or not self.roster.has_trees
-        return SearchEnd(0.0 if exact else p.mesh_impact_tolerance, self.period)
+        return SearchEnd(0.0 if exact else p.mesh_impact_tolerance, self.period, self.now)
 
     @property
     def horizons(self) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -146,3 +147,14 @@ def next_pair(parts, first_b, a, b):
     if b < 0:
         a, b = parts.next[a], first_b
     return a, b
+
+
+@inlined
+def chain_radius(table, parts, first):
+    """Radius (m) of a sphere about the origin of a chain of shapes that contains them."""
+    s, radius = first, 0.0
+    while s >= 0:
+        x, y, z = table.local_position[s, 0], table.local_position[s, 1], table.local_position[s, 2]
+        radius = max(radius, sqrt(x * x + y * y + z * z) + table.radius[s])
+        s = parts.next[s]
+    return radius

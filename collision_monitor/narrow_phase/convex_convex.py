@@ -16,7 +16,7 @@ from collision_monitor.narrow_phase.core import CorePair, core_length, core_pair
 from collision_monitor.narrow_phase.epa import epa
 from collision_monitor.narrow_phase.gjk import EXACT, Accuracy, gjk, point_on_a, simplex_point
 from collision_monitor.narrow_phase.pair_pose import PairPose
-from collision_monitor.narrow_phase.parallel_axes import axes_are_parallel, parallel_axes_depth
+from collision_monitor.narrow_phase.parallel_axes import ROUND_OFF_SLANT, axes_slant, parallel_axes_depth
 from collision_monitor.narrow_phase.support_difference import support_difference
 from collision_monitor.narrow_phase.work_memory import MAX_VERTICES, P_AB, R_AB, SPARE, WEIGHTS
 from collision_monitor.shapes.calls import core_radius
@@ -65,7 +65,8 @@ def cores_contact(
     px, py, pz = pose.p
     A, B = cores.A, cores.B
     ra, rb = radii
-    count, lower, normal = gjk(cores, work, size, limit + ra + rb, EXACT)
+    round_off = SAT_ROUND_OFF * (size + abs(px) + abs(py) + abs(pz) + ra + rb)
+    count, lower, normal = gjk(cores, work, size, limit + ra + rb + round_off, EXACT)
     if count == 0:
         return False
     curved = CURVED[A.kind] or CURVED[B.kind]
@@ -88,16 +89,21 @@ def cores_contact(
             d = support_difference(cores, work, opposite(between), SPARE)
             if distance - dot(between, d) < beside:
                 normal = between
-    elif axes_are_parallel(A, B, work):
-        depth, normal, point_a = parallel_axes_depth(A, B, work, size)
-        distance = -depth
-        bound = GJK_TOUCHING * size
     else:
-        tolerance, most = (EPA_CURVED, EPA_CURVED_POINTS) if curved else (EPA_POLYTOPE, MAX_VERTICES)
-        upper, lower, normal, point_a = epa(cores, work, size, count, tolerance, most)
-        distance = -upper
-        bound = abs(upper - lower) + GJK_TOUCHING * size
-    bound += SAT_ROUND_OFF * (size + abs(px) + abs(py) + abs(pz) + ra + rb)
+        off = axes_slant(A, B, work) * size
+        if off <= ROUND_OFF_SLANT * size:
+            depth, normal, point_a = parallel_axes_depth(A, B, work, size)
+            bound = off
+        else:
+            tolerance, most = (EPA_CURVED, EPA_CURVED_POINTS) if curved else (EPA_POLYTOPE, MAX_VERTICES)
+            depth, least, normal, point_a = epa(cores, work, size, count, tolerance, most)
+            bound = abs(depth - least)
+            if off < bound:  # all directions around the axes nearly tie, which EPA cannot tell from a deeper one
+                depth, normal, point_a = parallel_axes_depth(A, B, work, size)
+                bound = off
+        distance = -depth
+        bound += GJK_TOUCHING * size
+    bound += round_off
     # the radius moves A's surface that much along the normal
     point_a = along(point_a, ra, normal)
     write(out, distance - ra - rb, rotate(pose.R_A, normal), rotate(pose.R_A, point_a), bound)

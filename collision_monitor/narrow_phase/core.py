@@ -31,17 +31,18 @@ def core_of(table: Any, slot: int) -> Core:
 
 
 class CorePair(NamedTuple):
-    """The cores of two shapes, and the vertices (3, V) of the table, which hulls among them refer to."""
+    """The cores of two shapes, and the vertices (3, V) to which a hull among them refers."""
 
     A: Core
     B: Core
-    vertices: Any
+    vertices_a: Any
+    vertices_b: Any
 
 
 @inlined
 def core_pair(table: Any, a: int, b: int) -> CorePair:
     """The cores of two shapes."""
-    return CorePair(core_of(table, a), core_of(table, b), table.vertices)
+    return CorePair(core_of(table, a), core_of(table, b), table.vertices, table.vertices)
 
 
 @inlined

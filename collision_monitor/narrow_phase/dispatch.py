@@ -103,12 +103,20 @@ def pair_test(kind_a: int, kind_b: int) -> str:
 
 
 @inlined
-def _is_swapped(table: Any, a: int, b: int) -> bool:
-    """Whether the canonical order is b, a."""
+def is_second(table: Any, a: int, b: int, p: Vector) -> bool:
+    """Whether the canonical order of two shapes is b, a. p: B's origin relative to A's (m).
+
+    It depends on the shapes alone, not on their slots, so that an answer has the same bits whatever was asked before.
+    """
     ka, kb = table.kind[a], table.kind[b]
-    if ka == kb:
-        return a > b
-    return ka == HALF_SPACE or (ka > kb and kb != HALF_SPACE)
+    if ka != kb:
+        return ka == HALF_SPACE or (ka > kb and kb != HALF_SPACE)
+    for c in range(3):
+        if table.size[a, c] != table.size[b, c]:
+            return table.size[a, c] > table.size[b, c]
+    if table.radius[a] != table.radius[b]:
+        return table.radius[a] > table.radius[b]
+    return p[0] > 0.0 or (p[0] == 0.0 and (p[1] > 0.0 or (p[1] == 0.0 and p[2] > 0.0)))
 
 
 @inlined
@@ -119,7 +127,7 @@ def separation(table: Any, a: int, b: int, pose: PairPose, out: Any, work: Any, 
     as accurate as wanted for all pairs except separated boxes, whose bound is the largest SAT gap. The direction of a
     bound of at most accuracy.near is undefined.
     """
-    is_swapped = _is_swapped(table, a, b)
+    is_swapped = is_second(table, a, b, pose.p)
     if is_swapped:
         a, b = b, a
         pose = swapped(pose)
@@ -156,16 +164,16 @@ def _separation(table: Any, a: int, b: int, pose: PairPose, accuracy: Accuracy, 
 
 @inlined
 def contact_within(table: Any, a: int, b: int, pose: PairPose, limit: float, out: Any, work: Any) -> bool:
-    """Whether the signed distance is at most `limit` (m); only then `out` holds the contact (see contact_row.py).
+    """Whether the signed distance may be at most `limit` (m) within its error bound; only then `out` holds the contact.
 
     Most pairs of a broad phase are apart, so a test stops as soon as that is certain.
     """
-    is_swapped = _is_swapped(table, a, b)
+    is_swapped = is_second(table, a, b, pose.p)
     p = pose.p
     if is_swapped:
         a, b = b, a
         pose = swapped(pose)
-    if not (_contact(table, a, b, pose, limit, out, work) and out[DISTANCE] <= limit):
+    if not (_contact(table, a, b, pose, limit, out, work) and out[DISTANCE] - out[BOUND] <= limit):
         return False
     if is_swapped:
         mirror(out, p)

@@ -8,7 +8,7 @@ directions point by point.
 from __future__ import annotations
 
 from math import copysign, inf, sqrt
-from typing import Any
+from typing import Any, Final
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.vector import Vector
@@ -18,14 +18,20 @@ from collision_monitor.shapes.calls import revolved_profile
 from collision_monitor.shapes.registry import REVOLVED
 from collision_monitor.tolerances import FEATURE_TIE, SEGMENT_PARALLEL_SIN2
 
+ROUND_OFF_SLANT: Final = sqrt(SEGMENT_PARALLEL_SIN2)
+"""Slant of axes up to which they are taken as parallel, and EPA is not tried."""
+
 
 @inlined
-def axes_are_parallel(A: Core, B: Core, work: Any) -> bool:
-    """Whether both cores are solids of revolution with parallel axes; B's is the last column of R_AB in work."""
-    if not REVOLVED[B.kind] or not REVOLVED[A.kind]:
-        return False
+def axes_slant(A: Core, B: Core, work: Any) -> float:
+    """How far, per metre of size, two solids of revolution move if their axes are made parallel; infinite for others.
+
+    B's axis is the last column of R_AB in work. Points at a radius r move by 2 r sin(angle / 2), less than the result.
+    """
+    if not (REVOLVED[B.kind] and REVOLVED[A.kind]):
+        return inf
     x, y = work[R_AB + 2], work[R_AB + 5]
-    return x * x + y * y <= SEGMENT_PARALLEL_SIN2
+    return sqrt(2.0) * sqrt(x * x + y * y)  # at most 90 degrees: their axes have no sign here
 
 
 @device

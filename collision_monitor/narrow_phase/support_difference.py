@@ -22,11 +22,11 @@ def support_difference(cores: CorePair, work: Any, d: Vector, at: int) -> Vector
     """
     dx, dy, dz = d
     A, B = cores.A, cores.B
-    a = support_point(A.kind, A.size, cores.vertices, A.first, A.count, opposite(d))
+    a = support_point(A.kind, A.size, cores.vertices_a, A.first, A.count, opposite(d))
     lx, ly, lz = support_point(
         B.kind,
         B.size,
-        cores.vertices,
+        cores.vertices_b,
         B.first,
         B.count,
         (

@@ -19,7 +19,7 @@ Several = slice | Sequence[int] | Sequence[bool] | NDArray[np.integer[Any]] | ND
 class Pairs(NamedTuple):
     """The arguments of a batch, from which the result of one pair is made."""
 
-    shapes_a: Any  # PackedShapes
+    shapes_a: Any  # BatchShapes
     states_a: NDArray[np.float64]  # (N, …) or (1, …)
     shapes_b: Any
     states_b: NDArray[np.float64]

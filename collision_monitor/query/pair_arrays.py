@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from itertools import accumulate
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.checks.numbers import checked_rows
+from collision_monitor.checks.numbers import checked_rows, real_array
 from collision_monitor.errors import InputError, PoseError, ShapeError
-from collision_monitor.query.arguments import Compound
-from collision_monitor.query.packed import packed_shape
-from collision_monitor.shapes.pose import Pose
+from collision_monitor.meshes.trees.shape_trees import CERTAIN
+from collision_monitor.query.body import kept_slots, plant
+from collision_monitor.shapes.compound import Compound
+from collision_monitor.shapes.pose import Pose, as_pose
 from collision_monitor.shapes.registry import Shape
-from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
+from collision_monitor.tolerances import LARGEST_INPUT, NORMALISED, UNIT_QUATERNION
 
 Array = NDArray[np.float64]
 Shapes = Compound | Sequence[Compound]
@@ -25,16 +25,14 @@ AT_ONCE: Final = 1 << 14
 """Pairs of one call of a kernel, between two reports of progress: 5 to 50 ms."""
 
 
-LARGE: Final = 32
-"""Mean size of packed shapes from which repeated ones are found, which takes longer than copying small ones."""
+class BatchShapes(NamedTuple):
+    """N shapes, or one for all pairs, in the library. Each array is (N,) or (1,)."""
 
-
-class PackedShapes(NamedTuple):
-    """N shapes, or one for all pairs."""
-
-    rows: Array  # the different packed shapes, one after the other
-    at: NDArray[np.int64]  # (N,) or (1,): where each begins; -1: no convex solid, see `shapes`
-    shapes: Sequence[Compound]  # (N,) or (1,)
+    shapes: Sequence[Compound]
+    first: NDArray[np.int32]  # its slot; -1: only a single query answers it, as for compounds and some meshes
+    is_convex: NDArray[np.bool_]
+    is_bounded: NDArray[np.bool_]
+    has_mesh: bool  # one of them
 
     def __len__(self) -> int:
         return len(self.shapes)
@@ -43,36 +41,49 @@ class PackedShapes(NamedTuple):
         """Shape of pair k."""
         return self.shapes[k if len(self.shapes) > 1 else 0]
 
+    def plant(self) -> None:
+        """Give the convex pieces of all shapes the trees that pairs with meshes need."""
+        for shape in self.shapes:
+            if isinstance(shape, Shape) and (kept := kept_slots(shape)) and not kept.is_planted:
+                plant(kept, shape)
 
-def pack_shapes(value: Shapes, name: str) -> PackedShapes:
-    """Pack a shape, a compound (a list of (shape, pose)), or a list of N shapes and compounds. Raises ShapeError."""
+
+def batch_shapes(value: Shapes, name: str) -> BatchShapes:
+    """Lay out a shape, a compound (a list of (shape, pose)), or a list of N shapes and compounds. Raises ShapeError."""
     shapes: Sequence[Any] = [value] if isinstance(value, Shape) else value if isinstance(value, Sequence) else []
     if len(shapes) and isinstance(shapes[0], tuple):
         shapes = [shapes]  # one compound
     if not len(shapes):
         raise ShapeError(f"{name}: expected a shape, a compound or a list of them, got {value!r}")
-    rows = [getattr(shape, "packed_shape", None) for shape in shapes]
-    for k in [k for k, row in enumerate(rows) if row is None]:
-        found = getattr(shapes[k], "packed_shape", None)  # an equal object may come again
-        rows[k] = packed_shape(shapes[k]) if found is None else found
-    kept = [row for row in rows if row is not None]
-    sizes = np.fromiter((0 if row is None else len(row) for row in rows), np.int64, len(rows))
-    if sizes.sum() > LARGE * len(rows):  # hulls: each different one once
-        kept = list({id(row): row for row in kept}.values())
-        begin = dict(zip(map(id, kept), accumulate(map(len, kept), initial=0), strict=False))
-        at = np.array([-1 if row is None else begin[id(row)] for row in rows])
-    else:
-        at = np.where(sizes > 0, np.cumsum(sizes) - sizes, -1)
-    return PackedShapes(np.concatenate(kept or [np.zeros(0)]), at, shapes)
+    kept = [kept_slots(shape) for shape in shapes]
+    count = len(kept)
+    known = [each for each in kept if each is not None]
+    first = np.fromiter((each.first if each and each.inside == CERTAIN else -1 for each in kept), np.int32, count)
+    is_convex = np.fromiter((each is not None and each.is_convex for each in kept), np.bool_, count)
+    is_bounded = np.fromiter((each is None or each.is_bounded for each in kept), np.bool_, count)
+    return BatchShapes(shapes, first, is_convex, is_bounded, any(each.has_mesh for each in known))
 
 
 def pose_rows(value: Any, name: str) -> Array:
-    """Poses as rows (N, 7) with unit quaternions: of a Pose, a list of Pose, or an array (N, 7). Raises PoseError."""
+    """Poses as rows (N, 7) with unit quaternions. Raises PoseError.
+
+    value: one for all pairs, as `as_pose` takes it, a list of N, or an array (N, 7), (N, 3) of positions or (N, 4, 4).
+    """
     if isinstance(value, Pose):
-        value = [value]
-    if isinstance(value, Sequence) and len(value) and all(isinstance(pose, Pose) for pose in value):
-        return np.array([np.concatenate([pose.position, pose.quaternion]) for pose in value])
-    rows = checked_rows(value, 7, name, LARGEST_INPUT, PoseError)
+        return np.array([value.numbers])
+    if isinstance(value, Sequence) and len(value) and any(isinstance(pose, Pose) for pose in value):
+        return np.array([as_pose(pose, f"{name}, {k}").numbers for k, pose in enumerate(value)])
+    try:
+        found = real_array(value)
+    except (TypeError, ValueError, OverflowError):
+        got = type(value).__name__
+        raise PoseError(f"{name}: expected poses as rows (N, 7), or a list of Pose, got {got}") from None
+    if found.shape[-2:] == (4, 4):
+        matrices = found.reshape(-1, 4, 4)
+        return np.array([Pose.from_matrix(matrix).numbers for matrix in matrices]).reshape(-1, 7)
+    if found.ndim in (1, 2) and found.shape[-1] == 3:
+        found = np.concatenate([np.atleast_2d(found), np.tile([0.0, 0.0, 0.0, 1.0], (found.size // 3, 1))], axis=1)
+    rows = checked_rows(found, 7, name, LARGEST_INPUT, PoseError)
     norm = np.sqrt(np.einsum("ni,ni->n", rows[:, 3:], rows[:, 3:]))
     bad = np.flatnonzero(~(np.abs(norm - 1.0) <= UNIT_QUATERNION))
     if len(bad):
@@ -80,7 +91,7 @@ def pose_rows(value: Any, name: str) -> Array:
             f"{name}: expected quaternions of unit length within {UNIT_QUATERNION:g}, "
             f"got one of length {norm[bad[0]]:g} in row {bad[0]}"
         )
-    rows[:, 3:] /= norm[:, None]
+    rows[:, 3:] /= np.where(np.abs(norm - 1.0) <= NORMALISED, 1.0, norm)[:, None]
     return rows
 
 
@@ -107,6 +118,6 @@ def pair_ranges(count: int, progress: Progress | None) -> Iterator[slice]:
             progress(end)
 
 
-def part(values: Array | NDArray[np.int64], which: slice) -> Any:
+def part(values: Array | NDArray[np.int32], which: slice) -> Any:
     """Rows of an argument for these pairs; one row applies to all."""
     return values[which] if len(values) > 1 else values

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
-from collision_monitor.errors import ShapeError
-from collision_monitor.shapes.pose import Pose
+from collision_monitor.errors import PoseError, ShapeError
+from collision_monitor.shapes.pose import Pose, as_pose
 from collision_monitor.shapes.registry import Shape
+
+Compound = Shape | Sequence[tuple[Shape, Pose]]
+"""A shape, or several with their poses in the object's frame."""
 
 
 def shape_pairs(value: Any, what: str) -> tuple[tuple[Shape, Pose], ...]:
@@ -20,12 +23,17 @@ def shape_pairs(value: Any, what: str) -> tuple[tuple[Shape, Pose], ...]:
         raise ShapeError(f"{what}: expected a shape or a list of (shape, pose), got {value!r}")
     if isinstance(value, np.ndarray):  # one of no dimensions is Iterable, and raises
         value = value.tolist() if value.ndim else [value.item()]
-    pairs = tuple(tuple(item) if isinstance(item, Iterable) else item for item in value)
-    for pair in pairs:
-        is_pair = isinstance(pair, tuple) and len(pair) == 2
-        if not (is_pair and isinstance(pair[0], Shape) and isinstance(pair[1], Pose)):
-            got = f"got {pair!r} in the list; write [(shape, Pose()), …]"
-            raise ShapeError(f"{what}: expected a shape or a list of (shape, pose), {got}")
+    pairs = tuple(_pair(tuple(item) if isinstance(item, Iterable) else item, what) for item in value)
     if not pairs:
         raise ShapeError(f"{what}: expected at least one shape, got none")
     return pairs
+
+
+def _pair(pair: Any, what: str) -> tuple[Shape, Pose]:
+    if isinstance(pair, tuple) and len(pair) == 2 and isinstance(pair[0], Shape):
+        try:
+            return pair[0], as_pose(pair[1], "pose")
+        except PoseError:
+            pass
+    got = f"got {pair!r:.200} in the list; write [(shape, Pose()), …]"
+    raise ShapeError(f"{what}: expected a shape or a list of (shape, pose), {got}")

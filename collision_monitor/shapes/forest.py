@@ -38,13 +38,6 @@ class Forest:
         self._trees[start] = key, len(tree), 1
         return start
 
-    def with_own_users(self) -> Forest:
-        """Return a forest of the same blocks that counts its own users, for one that several threads share."""
-        shared = Forest(0)
-        shared.blocks, shared._used = self.blocks, self._used
-        shared._starts, shared._trees = dict(self._starts), dict(self._trees)
-        return shared
-
     def drop(self, start: int) -> None:
         """Forget one user of the tree at a first block; its room is free after the last."""
         key, count, users = self._trees[start]

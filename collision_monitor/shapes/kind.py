@@ -86,7 +86,6 @@ class Kind:
     bounded: bool = True
     simple: bool = True  # a few numbers, and nothing about it takes long
     exact: bool = False  # the distance of a point has a closed form, see calls.point_distance_range
-    packed: bool = False  # one row of the table represents it exactly, so that single calls pack it as numbers
 
     @property
     def expected_dimensions(self) -> int:

@@ -16,7 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.checks.numbers import real_array, real_number
 from collision_monitor.errors import PoseError
-from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
+from collision_monitor.shapes.matrix_to_pose import matrix_to_pose
+from collision_monitor.shapes.shape import Shape
+from collision_monitor.tolerances import LARGEST_INPUT, NORMALISED, UNIT_QUATERNION
 
 Array = NDArray[np.float64]
 
@@ -103,16 +105,13 @@ def _three(value: Any) -> tuple[float, float, float]:
 _REFUSED: Final = (TypeError, ValueError, OverflowError)
 
 
-def _matrix_rows(matrix: Any) -> list[list[float]]:
-    """Return the rows of a matrix (4, 4) or (3, 3) of finite numbers. Raises PoseError."""
-    try:
-        X = real_array(matrix)
-    except (TypeError, ValueError, OverflowError):
-        raise PoseError(f"matrix: expected numbers (4, 4) or (3, 3), got {matrix!r}") from None
-    if X.shape not in ((4, 4), (3, 3)):
-        raise PoseError(f"matrix: expected shape (4, 4) or (3, 3), got {X.shape}")
-    rows: list[list[float]] = X.tolist()
-    return rows
+def _matrix_error(X: Array) -> PoseError:
+    """What is wrong with a matrix (4, 4) or (3, 3)."""
+    if len(X) == 4 and (last := X[3].tolist()) != [0.0, 0.0, 0.0, 1.0]:
+        return PoseError(f"matrix: expected the last row 0 0 0 1, got {last}")
+    if len(X) == 4 and not (np.abs(X[:3, 3]) <= LARGEST_INPUT).all():
+        return PoseError(f"matrix: expected a finite position up to {LARGEST_INPUT:g}, got {X[:3, 3].tolist()}")
+    return PoseError(f"matrix: expected a rotation (orthonormal, determinant 1), got {X[:3, :3].tolist()}")
 
 
 class Frozen:
@@ -152,7 +151,7 @@ class Pose(Frozen):
             at = tuple(checked_vector(position, "position").tolist())
             x, y, z, w = checked_vector(quaternion, "quaternion", 4).tolist()
         norm = sqrt(x * x + y * y + z * z + w * w)
-        if norm == 1.0:
+        if abs(norm - 1.0) <= NORMALISED:  # to normalise it again would change its last bit
             self.__dict__["numbers"] = (*at, x, y, z, w)
         elif abs(norm - 1.0) <= UNIT_QUATERNION:
             self.__dict__["numbers"] = (*at, x / norm, y / norm, z / norm, w / norm)
@@ -199,31 +198,16 @@ class Pose(Frozen):
         >>> Pose.from_matrix([[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]]).position
         array([1., 2., 3.])
         """
-        rows = _matrix_rows(matrix)
-        if len(rows) == 4 and (last := rows.pop()) != [0.0, 0.0, 0.0, 1.0]:
-            raise PoseError(f"matrix: expected the last row 0 0 0 1, got {last}")
-        (a, b, c, *x), (d, e, f, *y), (g, h, i, *z) = rows
-        off = max(
-            abs(a * a + b * b + c * c - 1.0), abs(d * d + e * e + f * f - 1.0), abs(g * g + h * h + i * i - 1.0),
-            abs(a * d + b * e + c * f), abs(a * g + b * h + c * i), abs(d * g + e * h + f * i),
-        )  # fmt: skip
-        turned = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
-        if not off <= UNIT_QUATERNION or not turned > 0.0:
-            R = [[a, b, c], [d, e, f], [g, h, i]]
-            raise PoseError(f"matrix: expected a rotation (orthonormal, determinant 1), got {R}")
-        # the largest of 4 x^2, 4 y^2, 4 z^2, 4 w^2 loses no digits (Shepperd, 1978)
-        squares = 1 + a - e - i, 1 - a + e - i, 1 - a - e + i, 1 + a + e + i
-        largest = max(squares)
-        if largest == squares[3]:
-            q = h - f, c - g, d - b, largest
-        elif largest == squares[0]:
-            q = largest, b + d, c + g, h - f
-        elif largest == squares[1]:
-            q = b + d, largest, f + h, c - g
-        else:
-            q = c + g, f + h, largest, d - b
-        length = sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
-        return cls((*x, *y, *z) if x else (0.0, 0.0, 0.0), tuple([each / length for each in q]))
+        try:
+            X = np.array(real_array(matrix), order="C")
+        except (TypeError, ValueError, OverflowError):
+            raise PoseError(f"matrix: expected numbers (4, 4) or (3, 3), got {matrix!r}") from None
+        if X.shape not in ((4, 4), (3, 3)):
+            raise PoseError(f"matrix: expected shape (4, 4) or (3, 3), got {X.shape}")
+        off, numbers = matrix_to_pose.entry(X)
+        if not off <= UNIT_QUATERNION:
+            raise _matrix_error(X)
+        return cls.of_numbers(numbers)
 
     @classmethod
     def from_euler(
@@ -362,4 +346,13 @@ def as_pose(value: Any, name: str) -> Pose:
     except PoseError as error:
         raise PoseError(f"{name}: {error}") from None
     got = f"an array of shape {shape}" if shape else type(value).__name__
+    if isinstance(value, Shape):
+        got += "; each shape is followed by its pose: shape_a, pose_a, shape_b, pose_b"
     raise PoseError(f"{name}: expected a Pose, (x, y, z), 7 numbers x y z qx qy qz qw or a matrix (4, 4), got {got}")
+
+
+def as_motion(value: Any, name: str) -> Motion:
+    """Return a motion. Raises PoseError for anything else; name: of the argument, for the error."""
+    if isinstance(value, Motion):
+        return value
+    raise PoseError(f"{name}: expected a Motion, got {type(value).__name__}; write Motion(pose)")

@@ -25,7 +25,7 @@ class RayInterval(NamedTuple):
     normal: Array  # (..., 3) outward unit normal where it enters
 
 
-def check_in_plane(d: Array) -> None:
+def check_direction_in_plane(d: Array) -> None:
     """Raise InputError for a direction out of the x-y plane."""
     if d[:, 2].any():
         raise InputError("direction: expected one in the x-y plane for a Circle or a Polygon, got one out of it")

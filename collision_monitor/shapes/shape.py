@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from math import nan
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,10 @@ Array = NDArray[np.float64]
 class Shape:
     """Base class of all shapes. Shapes with arrays compare by identity, the others by their sizes."""
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Copies and pickles hold the fields alone, not what later calls keep on the shape."""
+        return {each.name: self.__dict__[each.name] for each in fields(self)}
+
 
 def array_bytes(shape: Shape) -> int:
     """Bytes of the arrays of a shape: its points and faces."""
@@ -28,32 +33,35 @@ def array_bytes(shape: Shape) -> int:
 
 def positive(value: float, what: str, *, or_zero: bool = False) -> float:
     """Return a positive number of metres. Raises ShapeError."""
-    expected = f"{'0 or ' if or_zero else ''}a positive number of metres up to {LARGEST_INPUT:g}"
     try:
         number = real_number(value)
     except (TypeError, ValueError, OverflowError):
-        raise ShapeError(f"{what}: expected {expected}, got {value!r}") from None
+        number = nan
     if not (0.0 < number <= LARGEST_INPUT or (or_zero and number == 0.0)):
-        raise ShapeError(f"{what}: expected {expected}, got {number!r}")
+        expected = f"{'0 or ' if or_zero else ''}a positive number of metres up to {LARGEST_INPUT:g}"
+        raise ShapeError(f"{what}: expected {expected}, got {value!r}")
     return number
 
 
 def set_positive(shape: Shape, names: Sequence[str]) -> None:
     """Check that these fields of a new shape are positive numbers of metres, and make them float. Raises ShapeError."""
+    known = shape.__dict__
     for name in names:
-        what = f"{type(shape).__name__} {name.replace('_', ' ')}"
-        object.__setattr__(shape, name, positive(getattr(shape, name), what))
+        value = known[name]
+        if type(value) is not float or not 0.0 < value <= LARGEST_INPUT:  # the text of an error takes longest
+            known[name] = positive(value, f"{type(shape).__name__} {name.replace('_', ' ')}")
 
 
 def full_extents(value: Any, what: str, example: str) -> tuple[float, float, float]:
     """Return three full extents in metres, not all zero. Raises ShapeError."""
     try:
-        size = tuple(map(real_number, value if type(value) in (tuple, list) else real_array(value).tolist()))
+        x, y, z = map(real_number, value if type(value) in (tuple, list) else real_array(value).tolist())
     except (TypeError, ValueError, OverflowError):
         raise ShapeError(f"{what}: expected 3 full extents in m, as {example}, got {value!r}") from None
-    if len(size) != 3 or not all(0.0 <= s <= LARGEST_INPUT for s in size) or max(size) == 0.0:
-        raise ShapeError(f"{what}: expected 3 extents from 0 to {LARGEST_INPUT:g}, not all zero, got {size}")
-    return size[0], size[1], size[2]
+    are_valid = 0.0 <= x <= LARGEST_INPUT and 0.0 <= y <= LARGEST_INPUT and 0.0 <= z <= LARGEST_INPUT
+    if not (are_valid and (x, y, z) != (0.0, 0.0, 0.0)):
+        raise ShapeError(f"{what}: expected 3 extents from 0 to {LARGEST_INPUT:g}, not all zero, got {(x, y, z)}")
+    return x, y, z
 
 
 def point_rows(value: ArrayLike, what: str, width: int, least: int) -> Array:

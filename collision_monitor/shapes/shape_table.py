@@ -6,7 +6,7 @@ The dtypes and the memory order never depend on the content, so that adding a sh
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf
+from math import inf, isfinite, nextafter
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 
 TREE: Final = 3
 """Column of `size` with the first block of the shape's tree plus 1, or 0; a half-space has its offset there."""
+
+_UPRIGHT: Final = np.eye(3)
 
 SHARED: Final = ("vertices", "vertex_index", "blocks")
 """Fields of a table without a row for each slot."""
@@ -173,7 +175,7 @@ class ShapeTableBuilder:
         needed (`meshes.trees.shape_trees`).
         Raises UnsupportedError for a kind without kernels, ShapeError for an invalid margin.
         """
-        if not (np.isfinite(margin) and margin >= 0.0):
+        if not (isfinite(margin) and margin >= 0.0):
             raise ShapeError(f"margin: expected a finite number of metres >= 0, got {margin!r}")
         kind = kind_of(shape)
         row = kind.row(shape, corners)
@@ -185,14 +187,14 @@ class ShapeTableBuilder:
         margin += row.margin
         slot = self._new_slot()
         table = self.table
-        table.size[slot] = 0.0
-        table.size[slot, : len(row.size)] = row.size
+        table.size[slot] = (*row.size, 0.0, 0.0, 0.0, 0.0)[:4]
         table.margin[slot] = margin
         # rounded up, because the sphere must contain the shape in spite of round-off
-        table.radius[slot] = np.nextafter(row.radius * (1 + 1e-15) + margin, inf)
-        table.vertex_start[slot], table.vertex_count[slot] = start, count
+        table.radius[slot] = nextafter(row.radius * (1 + 1e-15) + margin, inf)
+        if count or table.vertex_count[slot]:
+            table.vertex_start[slot], table.vertex_count[slot] = start, count
         table.local_position[slot] = 0.0 if pose is None else pose.position
-        table.local_rotation[slot] = np.eye(3) if pose is None else pose.rotation
+        table.local_rotation[slot] = _UPRIGHT if pose is None else pose.rotation
         table.kind[slot] = row.number
         if tree is not None:
             self.plant(slot, tree)
@@ -210,17 +212,18 @@ class ShapeTableBuilder:
             raise InputError(f"expected the slot of a shape in the table, got {slot!r}")
         if self.table.vertex_count[slot]:
             start = int(self.table.vertex_start[slot])
+            self.table.vertex_start[slot] = 0
             key, users = self._users[start]
             if users > 1:
                 self._users[start] = key, users - 1
             else:
                 del self._users[start], self._blocks[key]
                 self._free_blocks.setdefault(int(self.table.vertex_count[slot]), []).append(start)
+            self.table.vertex_count[slot] = 0
         if self.table.size[slot, TREE] > 0.0 and self.table.kind[slot] != HALF_SPACE:
             self._forest.drop(int(self.table.size[slot, TREE]) - 1)
-        self.table.size[slot] = 0.0
+            self.table.size[slot, TREE] = 0.0
         self.table.kind[slot] = 0
-        self.table.vertex_start[slot] = self.table.vertex_count[slot] = 0
         self._free_slots.append(slot)
 
     def _new_slot(self) -> int:

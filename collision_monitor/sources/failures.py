@@ -8,6 +8,7 @@ import traceback
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
+from collision_monitor.settings.regular_file import read_regular
 from collision_monitor.sources.ground.source import RawMessage
 
 MOST_FAILURE_FILES: Final = 20
@@ -78,5 +79,5 @@ class FailureFiles:
 
 def read_failure(path: Path) -> RawMessage:
     """Return the message of a file. Raises OSError, ValueError and KeyError for another file."""
-    content: dict[str, Any] = json.loads(path.read_text())
+    content: dict[str, Any] = json.loads(read_regular(path, "a failure of a source", most=2 * LARGEST_MESSAGE))
     return RawMessage(content["topic"], content["type"], base64.b64decode(content["data"]), int(content["received"]))

@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.impact.body_impact import ImpactQuery, ShapePair, Tube, Window, shape_impact
 from collision_monitor.impact.impact_record import CLEAR
 from collision_monitor.motion.bodies import next_pair
@@ -116,7 +116,7 @@ class Laid(NamedTuple):
     complete: bool  # whether the segments reach the end, with planes enough
 
 
-@device
+@outlined
 def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, work):
     """Bound the obstacle of a pair of shapes (ShapePair) by planes where the samples of the search need them.
 
@@ -202,7 +202,7 @@ def _is_left_out(quiet, k, segments):
     return (k == 0 or quiet[k - 1] != LOUD) and (k + 1 >= segments or quiet[k + 1] != LOUD)
 
 
-@device
+@outlined
 def _enter_pair(table, parts, pair, laid, errors, points, samples, verified, tolerance, memory, work):
     """Lower memory.times to the impacts of the first `samples` with the planes that are laid, and some more.
 

@@ -55,8 +55,10 @@ def size(shape) -> float:
     match shape:
         case shapes.Sphere():
             return shape.radius
-        case shapes.Box():
+        case shapes.Box() | shapes.RoundedBox():
             return max(shape.size)
+        case shapes.TruncatedCone():
+            return max(shape.bottom_radius, shape.top_radius) + shape.length
         case shapes.HalfSpace():
             return abs(shape.offset)
         case shapes.ConvexHull():

@@ -7,13 +7,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from collision_monitor._jit import kernel
-from collision_monitor.meshes.distance.contact import contact_of_trees
+from collision_monitor.meshes.distance.contact import tree_contact
 from collision_monitor.meshes.distance.depth_range import depth_range
 from collision_monitor.meshes.distance.nearest import MEMORY, answer_row
 from collision_monitor.meshes.overlap.touching_triangles import trees_touch
 from collision_monitor.meshes.placing import relative
 from collision_monitor.meshes.trees.shape_trees import made_tree
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE, DISTANCE
+from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.shapes.registry import Box, ConvexHull, Mesh, Shape, Sphere
 from collision_monitor.world.arm import link
 
@@ -34,6 +35,11 @@ def ranges(blocks, root_b, R_a, R_b, p, wanted, answer, work, found):
     found[0], found[1] = depth_range(blocks, 0, root_b, X, wanted, answer, work)
 
 
+@kernel
+def contact(blocks, root_b, R_a, R_b, p, out, answer, work):
+    tree_contact(blocks, 0, blocks, root_b, PairPose(R_a, R_b, (p[0], p[1], p[2])), 0.0, out, answer, work)
+
+
 @pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
 @pytest.mark.parametrize("other", list(SHAPES))
 def test_the_range_holds_the_depth_of_the_deepest_triangles(other: str, scale: float) -> None:
@@ -46,7 +52,7 @@ def test_the_range_holds_the_depth_of_the_deepest_triangles(other: str, scale: f
         R_a, R_b = Rotation.random(2, rng=rng).as_matrix()
         p, origin = rng.normal(size=3) * 0.3 * scale, np.zeros(3)
         count, _ = trees_touch(tree_a, R_a, origin, tree_b, R_b, p, 1, work)
-        contact_of_trees(tree_a, R_a, origin, tree_b, R_b, p, 0.0, out, answer_row(), work)
+        contact(blocks, len(tree_a), R_a, R_b, p, out, answer_row(), work)
         for wanted in (0.0, 0.01 * scale, 0.1 * scale, np.inf):
             ranges(blocks, len(tree_a), R_a, R_b, p, wanted, answer_row(), work, found)
             least, most = found

@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from collision_monitor.meshes.distance.point_range import point_range
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
@@ -17,6 +16,7 @@ from collision_monitor.meshes.distance.solid_range import solid_range
 from collision_monitor.meshes.trees.shape_trees import made_tree
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.shapes.calls import point_distance_range
 from collision_monitor.shapes.registry import Box, Cone, Cylinder, Ellipsoid, HalfSpace, Mesh, Points, Shape
 from collision_monitor.shapes.shape_table import ShapeTable, ShapeTableBuilder
 from collision_monitor.world.arm import link
@@ -54,7 +54,7 @@ def contact(tree, margin, table, R_a, R_b, p, limit, out, triangle, gjk, tree_wo
 @kernel
 def point_ranges(table, points, lower, upper, normal):
     for k in range(len(points)):
-        lower[k], upper[k], n = point_range(table, 0, (points[k, 0], points[k, 1], points[k, 2]))
+        lower[k], upper[k], n = point_distance_range(table, 0, (points[k, 0], points[k, 1], points[k, 2]))
         normal[k, 0], normal[k, 1], normal[k, 2] = n
 
 

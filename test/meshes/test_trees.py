@@ -10,9 +10,10 @@ import trimesh
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+import collision_monitor as cm
 from collision_monitor.geometry.polyhedra import edge_face, locate_in_polyhedron
 from collision_monitor.meshes.distance.nearest import MEMORY, PAIRS, PLACE_A, PLACE_B, answer_row, tree_distance
-from collision_monitor.meshes.extent import extents
+from collision_monitor.meshes.extent import tree_extents
 from collision_monitor.meshes.layout import AXES, CENTER, CHILD, FACE, HALF, WIDTH
 from collision_monitor.meshes.overlap.touching_triangles import trees_touch
 from collision_monitor.meshes.trees import tree
@@ -183,19 +184,15 @@ def test_the_reach_of_a_tree_is_that_of_its_corners():
     directions /= np.linalg.norm(directions, axis=1)[:, None]
     for corners in SURFACES.values():
         expected = (corners.reshape(-1, 3) @ directions.T).max(axis=0) + 0.2
-        assert extents(tree_of(corners, 0.2), directions) == pytest.approx(expected, abs=1e-14)
+        assert tree_extents(tree_of(corners, 0.2), directions) == pytest.approx(expected, abs=1e-14)
 
 
 def test_a_point_is_inside_a_closed_surface_where_the_exact_test_says_so():
-    from collision_monitor.query.contact.mesh_pairs import packed_trees_overlap, query_memory
-
     rng = np.random.default_rng(9)
-    tree = tree_of(SURFACES["ring"], closed=True)
+    ring = cm.Mesh(RING.vertices, RING.faces)
     points = rng.uniform(-1.5, 1.5, (300, 3)) * (1, 1, 0.4)
     expected = locate_in_polyhedron(points, RING.vertices, RING.faces) >= 0
-    dot = tree_of(np.zeros((1, 3, 3)))
-    poses = np.column_stack([points, np.zeros((300, 3)), np.ones(300)])
-    got = [bool(packed_trees_overlap(tree, np.eye(7)[6:], dot, pose[None], query_memory())) for pose in poses]
+    got = [cm.overlap(ring, cm.Pose(), cm.Points([point]), cm.Pose()) for point in points]
     assert got == expected.tolist()
     assert expected.any() and not expected.all()
 

@@ -12,9 +12,8 @@ from numba import typeof
 
 import collision_monitor as cm
 from collision_monitor._jit.settled import SettledFunction
-from collision_monitor.query.contact.contact_rows import contact_row
-from collision_monitor.query.contact.mesh_pairs import packed_trees_overlap, roots_apart, trees_contact
-from collision_monitor.query.impact.mesh_pair_impact import _impact_in_hulls, _mesh_impact
+from collision_monitor.query.contact.contact_kernel import contact_of_chains, overlap_of_chains
+from collision_monitor.query.impact.impact_kernel import impact_of_chains
 
 TORUS = trimesh.creation.torus(1.0, 0.4, major_sections=12, minor_sections=8)
 SOUP = np.random.default_rng(1).normal(size=(60, 3))
@@ -32,7 +31,7 @@ SHAPES: list[cm.Shape] = [
     cm.Mesh(SOUP.astype(np.float32), np.arange(60, dtype=np.int32).reshape(20, 3)),
     cm.Mesh(TORUS.vertices, TORUS.faces[:-30]),
 ]
-KERNELS = (contact_row, trees_contact, packed_trees_overlap, roots_apart, _mesh_impact, _impact_in_hulls)
+KERNELS = (contact_of_chains, overlap_of_chains, impact_of_chains)
 
 
 class Seen:

@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import inlined, kernel, outlined
+from collision_monitor._jit import inlined, outlined
 from collision_monitor.geometry.vector import along, dot, minus, opposite, rotate, sum_of_sizes
 from collision_monitor.meshes.distance.nearest import LEAST, MOST_PAIRS, ON_A, ON_B, PLACE_A, nearest_triangles
 from collision_monitor.meshes.layout import AXES, CENTER, HALF, RADIUS, REACH, WIDTH
@@ -91,9 +91,3 @@ def tree_contact(
     write(out, distance, rotate(pose.R_A, n), rotate(pose.R_A, on_a), round_off)
     return known
 
-
-@kernel
-def contact_of_trees(tree_a, R_a, p_a, tree_b, R_b, p_b, limit, out, answer, work):
-    """`tree_contact` of two trees at poses given by rotations (3, 3) and positions (3,) (m); the points are about A."""
-    p = p_b[0] - p_a[0], p_b[1] - p_a[1], p_b[2] - p_a[2]
-    return tree_contact(tree_a, 0, tree_b, 0, PairPose(R_a, R_b, p), limit, out, answer, work)

@@ -122,16 +122,16 @@ def _point_contact(
         distance -= radius + table.margin[b]
         scale = sum_of_sizes(pose.p) + sum_of_sizes(x) + radius + table.size[b, 0] + table.size[b, 1] + table.size[b, 2]
         write(out, distance, opposite(n), along(x, -radius, n), SAT_ROUND_OFF * scale)
-        return distance <= limit
+        return distance - out[BOUND] <= limit
     p = minus(pose.p, x)
-    cores = CorePair(Core(SPHERE, (0.0, 0.0, 0.0), 0, 0), core_of(table, b), table.vertices)
+    cores = CorePair(Core(SPHERE, (0.0, 0.0, 0.0), 0, 0), core_of(table, b), table.vertices, table.vertices)
     radii, at = (radius, rounding(table, b)), PairPose(pose.R_A, pose.R_B, p)
     if not cores_contact(cores, radii, core_length(table, b), at, limit, out, memory.gjk):
         return False
     for c in range(3):
         out[POINT_A + c] += x[c]
         out[POINT_B + c] += x[c]
-    return out[DISTANCE] <= limit
+    return out[DISTANCE] - out[BOUND] <= limit
 
 
 @device
@@ -147,7 +147,7 @@ def triangle_solid_contact(
         scale = abs(witness[0]) + abs(witness[1]) + abs(witness[2]) + abs(pose.p[0]) + abs(pose.p[1]) + abs(pose.p[2])
         distance = dot(n, minus(witness, pose.p)) - table.size[b, 3] - table.margin[b]
         write(out, distance, opposite(n), witness, SAT_ROUND_OFF * (scale + abs(table.size[b, 3])))
-        return distance <= limit
+        return distance - out[BOUND] <= limit
     if _is_point(T):
         return _point_contact(table, b, pose, T.a, radius, limit, out, memory)
     middle, length = _middle(T)  # about its own centre, since the error of GJK grows with the corners' distance
@@ -155,7 +155,7 @@ def triangle_solid_contact(
         x = minus(T.a if k == 0 else (T.b if k == 1 else T.c), middle)
         memory.triangle[0, k], memory.triangle[1, k], memory.triangle[2, k] = x
     flat = Core(CONVEX_HULL, (0.0, 0.0, 0.0), 0, LANES)
-    cores = CorePair(flat, core_of(table, b), memory.triangle)
+    cores = CorePair(flat, core_of(table, b), memory.triangle, table.vertices)
     shift = rotate(pose.R_A, middle)
     radii, at = (radius, rounding(table, b)), PairPose(pose.R_A, pose.R_B, minus(pose.p, shift))
     if not cores_contact(cores, radii, core_length(table, b) + length, at, limit, out, memory.gjk):
@@ -164,7 +164,7 @@ def triangle_solid_contact(
         out[POINT_A + c] += shift[c]
         out[POINT_B + c] += shift[c]
     out[BOUND] += SAT_ROUND_OFF * (sum_of_sizes(pose.p) + sum_of_sizes(shift))
-    return out[DISTANCE] <= limit
+    return out[DISTANCE] - out[BOUND] <= limit
 
 
 @device
@@ -180,7 +180,9 @@ def solid_contact(
     X = relative(pose.R_A, pose.R_B, pose.p)
     Y = inverse(X)
     work, row = memory.tree, memory.tree[NEAR_A : NEAR_A + CONTACT_SIZE]
-    best, found, enough, examined = limit, False, limit, 0
+    lengths = abs(table.size[b, 0]) + abs(table.size[b, 1]) + abs(table.size[b, 2]) + abs(table.size[b, 3])
+    round_off = SAT_ROUND_OFF * (sum_of_sizes(pose.p) + reach_in(blocks, root) + lengths)  # of the bounds of boxes
+    best, found, enough, examined = limit, False, limit + round_off, 0
     work[0], work[1] = -inf, WIDTH * root
     waiting = 1
     while waiting > 0:  # terminates: each box is opened once

@@ -58,30 +58,6 @@ def kept_tree(shape: Shape, split: int = 0) -> KeptTree:
     return known
 
 
-def have_kernels(a: KeptTree, b: KeptTree, most: int) -> bool:
-    """Whether two shapes have trees, one is a concave mesh, and what is inside is as certain as `most` at least."""
-    return (
-        (a.concave or b.concave)
-        and a.inside <= most
-        and b.inside <= most
-        and a.tree is not None
-        and b.tree is not None
-    )
-
-
-def trees_of_pair(a: Shape, b: Shape, surface: bool = False) -> tuple[Array, Array] | None:
-    """Trees of two shapes; None unless one of them is a concave mesh and the other has a tree.
-
-    Also None for a cloud, and if it is not certain what is inside of a mesh. surface: of a mesh with a hole that is the
-    surface alone.
-    """
-    own, other = kept_tree(a), kept_tree(b)
-    if not have_kernels(own, other, NEVER if surface else CERTAIN):
-        return None
-    assert own.tree is not None and other.tree is not None
-    return own.tree, other.tree
-
-
 def _plate(box: Box) -> Array:
     """Triangles (12, 3, 3) of the faces of a box without thickness."""
     k = box.corners

@@ -12,7 +12,7 @@ from __future__ import annotations
 from math import sqrt
 from typing import Final
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.geometry.vector import dot, opposite, rotate_back
 from collision_monitor.impact.body_contact import (
     RESULT,
@@ -194,7 +194,7 @@ def apart_or_none(multibody, a, b, pose, there, query, scratch):
     return APART if enclosure(multibody.table, a, b, pose, scratch) == OUTSIDE else NONE
 
 
-@device
+@outlined
 def overlap_of_trees(multibody, i, j, now, query, carrying, scratch, result):
     """Write the contact of bodies i and j at `now` (s) into a result row, if triangles of both meet.
 

@@ -118,7 +118,7 @@ def _of_hull(table: Any, s: int, x: Vector, n: Vector, reach: float, work: Any) 
     for i in range(9):
         work[R_AB + i] = 1.0 if i % 4 == 0 else 0.0
     work[P_AB], work[P_AB + 1], work[P_AB + 2] = opposite(above)
-    cores = CorePair(Core(SPHERE, (0.0, 0.0, 0.0), 0, 0), core_of(table, s), table.vertices)
+    cores = CorePair(Core(SPHERE, (0.0, 0.0, 0.0), 0, 0), core_of(table, s), table.vertices, table.vertices)
     spanned, _, _ = gjk(cores, work, 2.0 * radius, inf, EXACT)
     # a simplex of one or two points repeats the last; one of four points is flat, so any three of them are its face
     last = min(spanned, 3) - 1

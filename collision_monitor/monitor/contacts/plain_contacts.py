@@ -26,7 +26,7 @@ from collision_monitor.motion.motion import rotation_now
 from collision_monitor.narrow_phase.box_box import axis_direction, sat, touching_features
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A
 from collision_monitor.narrow_phase.core import half_extents
-from collision_monitor.narrow_phase.dispatch import mirror
+from collision_monitor.narrow_phase.dispatch import is_second, mirror
 from collision_monitor.narrow_phase.pair_pose import PairPose, swapped
 from collision_monitor.narrow_phase.sphere_sphere import sphere_sphere_contact
 from collision_monitor.shapes.kinds.sphere import SPHERE
@@ -50,7 +50,7 @@ def plain_contact(
     a, b = bodies.first_shape[i], bodies.first_shape[j]
     result[SHAPE_I], result[SHAPE_J], result[STATUS] = a, b, TOUCHING
     relative = relative_now(bodies, i, j, now)
-    is_swapped = a > b  # the order in which dispatch.py tests them
+    is_swapped = is_second(table, a, b, relative.p)
     if is_swapped:
         a, b = b, a
     if kind == SPHERE:

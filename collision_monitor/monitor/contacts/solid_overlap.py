@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import inf
 from typing import Any
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import inlined, outlined
 from collision_monitor.geometry.vector import dot, opposite, rotate_back
 from collision_monitor.impact.body_contact import (
     SHAPE_I,
@@ -53,7 +53,7 @@ def _parting(table: Any, a: int, b: int, pose: PairPose, out: Any) -> float:
     return reach - dot(n, pose.p)
 
 
-@device
+@outlined
 def overlap_of_solid(
     multibody: Any, i: int, j: int, now: float, query: Any, tolerance: float, scratch: Any, result: Any
 ) -> float:

@@ -2,74 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
 from functools import cached_property
+from math import inf
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.errors import UnsupportedError
-from collision_monitor.geometry.inside import UNKNOWN
-from collision_monitor.geometry.point_in_polygon import Location
-from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B, as_contacts
-from collision_monitor.narrow_phase.manifold import manifold_batch, outline
-from collision_monitor.query.arguments import Compound
-from collision_monitor.query.contact.convex_pairs import packed_contact
-from collision_monitor.query.contact.mesh_pairs import mesh_contact
-from collision_monitor.query.contact.nearest_or_deepest import (
-    by_clouds,
-    by_pieces,
-    by_trees,
-    locate_in_meshes,
-    nearest_pieces,
-    turn_inward,
-)
-from collision_monitor.query.contact.nearest_pieces import NearestPieces
-from collision_monitor.query.contact.open_gap import distance_of_fillings
+from collision_monitor.impact.mesh_pair import SOLIDS
+from collision_monitor.meshes.trees.shape_trees import CERTAIN, UNCERTAIN
+from collision_monitor.narrow_phase.contact_row import DISTANCE, NORMAL, POINT_A, POINT_B
+from collision_monitor.query.body import KeptSlots, QueryBody, check_in_plane, kept_slots, plant, query_body
+from collision_monitor.query.contact.contact_kernel import contact_row
+from collision_monitor.query.contact.contact_text import contact_text
+from collision_monitor.query.contact.open_gap import INSIDE, UNKNOWN, least_gap, location_of
 from collision_monitor.query.contact.parting import parting_translation
-from collision_monitor.query.piece_table import exact_piece_table
-from collision_monitor.query.posed import check_side_in_plane, posed
+from collision_monitor.query.contact.patch import patch_of
 from collision_monitor.records import Model
-from collision_monitor.shapes.planar import is_planar
-from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.registry import Mesh
-from collision_monitor.tolerances import FEATURE_TIE
+from collision_monitor.shapes.compound import Compound
+from collision_monitor.shapes.pose import Frozen, Pose, as_pose
+from collision_monitor.shapes.registry import KINDS, kind_of
 
 Array = NDArray[np.float64]
+Arguments = tuple[Compound, Pose, Compound, Pose]
 
 _COLUMNS: Final = {"normal": NORMAL, "point_a": POINT_A, "point_b": POINT_B}
-_new, _set = object.__new__, object.__setattr__
+_FIELDS: Final = ("signed_distance", "error_bound", "normal", "point_a", "point_b", "model_a", "model_b")
 
 
-def _missing(contact: object, name: str) -> AttributeError:
-    return AttributeError(f"{type(contact).__name__!r} object has no attribute {name!r}", name=name, obj=contact)
-
-
-def _patch(found: NearestPieces, origin: Array, witness: Array) -> Array:
-    """Corners (k, 3) on A of the patch of all pieces that touch in one plane; a floor of triangles is one face.
-
-    origin, witness: A's origin and witness point (m).
-    """
-    radius = found.table.radius[found.pair]
-    tie = FEATURE_TIE * float(radius[np.isfinite(radius)].sum())
-    patches = []
-    best = as_contacts(found.best)
-    for pairs, rows in found.looked_at:
-        contacts = as_contacts(rows)
-        level = contacts["distance"] <= best["distance"] + tie
-        level &= contacts["normal"] @ best["normal"] >= 1.0 - FEATURE_TIE
-        count, points = manifold_batch(found.table, found.position, found.rotation, pairs[level], rows[level])
-        patches += [points[i, : count[i]] + found.position[pairs[level][i, 0]] for i in range(len(count))]
-    patch = patches[0] if len(patches) == 1 else outline(np.concatenate(patches), best["normal"], tie)
-    if len(patch) == 1:
-        return witness[None]
-    return np.asarray(patch + origin)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Contact:
+class Contact(Frozen):
     """Contact of two shapes in the world frame, lengths in m.
 
     signed_distance: negative if they overlap; -inf for two half-spaces that do not face each other, which no
@@ -90,39 +52,38 @@ class Contact:
     point_b: Array
     model_a: Model
     model_b: Model
-    _find: Callable[[], NearestPieces] | None = field(repr=False)  # source of the patch; None: the two points alone
+    arguments: Arguments
+    """The two shapes with their poses, as they were given to `contact`."""
+
+    def __init__(self, distance: float, bound: float | None, row: Array, arguments: Arguments) -> None:
+        """Not for users. bound: None if it takes so long that it is computed when it is read."""
+        known = self.__dict__
+        known["signed_distance"], known["_row"], known["arguments"] = distance, row, arguments
+        if bound is not None:
+            known["error_bound"] = bound
 
     def __getattr__(self, name: str) -> Any:
-        """Make a field of a contact that was found quickly when it is first read."""
-        known = vars(self)
-        if "_row" not in known:
-            raise _missing(self, name)
-        if name == "error_bound":
-            value: Any = _contact(*self.arguments, "exact").error_bound
-        elif name in _COLUMNS:
-            value = known["_row"][_COLUMNS[name] : _COLUMNS[name] + 3]
+        """Make a field when it is first read; a query that reads the distance alone does not wait for the others."""
+        known = self.__dict__
+        if name in _COLUMNS:
+            value: Any = known["_row"][_COLUMNS[name] : _COLUMNS[name] + 3]
         elif name in ("model_a", "model_b"):
             value = Model.EXACT
-        elif name == "_find":
-            arguments = self.arguments
-            value = lambda: _nearest(*arguments)  # noqa: E731
+        elif name == "error_bound":
+            value = _completed(self.arguments, "exact").error_bound
         else:
-            raise _missing(self, name)
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
         known[name] = value
         return value
 
-    @property
-    def arguments(self) -> tuple[Compound, Pose, Compound, Pose]:
-        """The two shapes with their poses, as they were given to `contact`."""
-        found: tuple[Compound, Pose, Compound, Pose] = vars(self)["_arguments"]
-        return found
-
     def __repr__(self) -> str:
         """Return the distance with its error and the features that are nearest, for a person."""
-        from collision_monitor.query.contact.contact_text import contact_text
-
         points = self.point_a, self.point_b
         return contact_text(self.arguments, points, self.normal, self.signed_distance, self.error_bound)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles hold all fields."""
+        return _restored, (self.arguments, {name: getattr(self, name) for name in _FIELDS}, self.__dict__["_row"])
 
     @property
     def overlaps(self) -> bool:
@@ -135,10 +96,13 @@ class Contact:
 
         Otherwise `point_a` alone. Computed on first access.
         """
-        found = None if self._find is None else self._find()
-        if found is None or found.best[DISTANCE] > 0.0 >= self.signed_distance:  # one is in the other: no surfaces meet
+        shape_a, pose_a, shape_b, pose_b = self.arguments
+        if self.signed_distance == -inf:
             return self.point_a[None]
-        return _patch(found, self.arguments[1].position, self.point_a)
+        known = self.__dict__.get("_bodies")
+        a, b = known or (query_body(shape_a, Model.EXACT, "shape A"), query_body(shape_b, Model.EXACT, "shape B"))
+        found = patch_of(a, pose_a, b, pose_b, self.__dict__["_row"])
+        return self.point_a[None] if found is None else found
 
     @cached_property
     def points_b(self) -> Array:
@@ -146,11 +110,18 @@ class Contact:
         return self.point_b[None] if len(self.points_a) == 1 else self.points_a + self.signed_distance * self.normal
 
 
+def _restored(arguments: Arguments, fields: dict[str, Any], row: Array) -> Contact:
+    made = Contact(fields["signed_distance"], fields["error_bound"], row, arguments)
+    made.__dict__.update(fields)
+    return made
+
+
 def contact(
-    shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, model: Model | str | ArrayLike = "exact"
+    shape_a: Compound, pose_a: Any, shape_b: Compound, pose_b: Any, model: Model | str | ArrayLike = "exact"
 ) -> Contact:
     """Contact of two shapes, or compounds given as lists of (shape, pose), at two poses.
 
+    A pose is a Pose, a position (x, y, z), 7 numbers x y z qx qy qz qw, or a matrix (4, 4).
     model: model of both, "exact" or one that contains them ("sphere", "aabb", "obb", "kdop14", "convex_hull", …), which
     is coarser; the error bound includes its error. Directions (k/2, 3) in the frame of each object are a k-DOP of your
     own, reported as CONVEX_HULL.
@@ -163,85 +134,81 @@ def contact(
     >>> cm.contact(cm.Box((1, 1, 1)), cm.Pose(), cm.Sphere(0.5), cm.Pose((2, 0, 0)))
     Contact(1 m ± ..., box face 0 – sphere surface)
     """
-    if (type(model) is str and model == "exact") or (isinstance(model, str | int) and model == Model.EXACT):
-        by_kernel = mesh_contact if type(shape_a) is Mesh or type(shape_b) is Mesh else packed_contact
-        quick = by_kernel(shape_a, pose_a, shape_b, pose_b)
-        if quick is not None:
-            return contact_of_row(quick, (shape_a, pose_a, shape_b, pose_b))
-    return _contact(shape_a, pose_a, shape_b, pose_b, model)
+    pose_a = pose_a if type(pose_a) is Pose else as_pose(pose_a, "pose A")
+    pose_b = pose_b if type(pose_b) is Pose else as_pose(pose_b, "pose B")
+    known = None
+    if model == "exact" if isinstance(model, str) else model is Model.EXACT:
+        a, b = kept_slots(shape_a), kept_slots(shape_b)
+        if a is not None and b is not None and a.inside != UNCERTAIN and b.inside != UNCERTAIN:
+            plant_for_meshes(a, shape_a, b, shape_b)
+            known = distance, bound, row = contact_row(a.first, pose_a, b.first, pose_b, SOLIDS)
+            if distance > 0.0 or (a.is_convex and b.is_convex):
+                is_certain = a.inside == b.inside == CERTAIN
+                return Contact(distance, bound if is_certain else None, row, (shape_a, pose_a, shape_b, pose_b))
+    return _completed((shape_a, pose_a, shape_b, pose_b), model, known)
 
 
-def _contact(
-    shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, model: Model | str | ArrayLike
+def plant_for_meshes(a: KeptSlots, shape_a: Any, b: KeptSlots, shape_b: Any) -> None:
+    """Give the pieces of a shape the trees that they need beside a mesh."""
+    if a.has_mesh and not b.is_planted:
+        plant(b, shape_b)
+    if b.has_mesh and not a.is_planted:
+        plant(a, shape_a)
+
+
+def _completed(
+    arguments: Arguments, model: Model | str | ArrayLike, known: tuple[float, float, Array] | None = None
 ) -> Contact:
-    """`contact` of any shapes and models."""
-    a, b = posed(shape_a, pose_a, model, "A"), posed(shape_b, pose_b, model, "B")
-    planes = {is_planar(shape) for shape, _ in (*a.shapes, *b.shapes)}
+    """`contact` of any shapes and models: the kernel's answer, with what concave and open ones add to its bound.
+
+    known: the kernel's answer, if it is known already.
+    """
+    shape_a, pose_a, shape_b, pose_b = arguments
+    a, b = query_body(shape_a, model, "shape A"), query_body(shape_b, model, "shape B")
+    if known is None:
+        check_kinds(a, pose_a, b, pose_b)
+        plant_bodies(a, b)
+        known = contact_row(a.slots.first, pose_a, b.slots.first, pose_b, SOLIDS)
+    distance, bound, row = known
+    if distance > 0.0 and not a.inside == b.inside == CERTAIN:
+        places = location_of(a, pose_a, b, pose_b)
+        if INSIDE in places:
+            distance = -distance  # one solid is in the other: at least this deep, and no surfaces meet
+            row[DISTANCE], row[NORMAL : NORMAL + 3] = distance, -row[NORMAL : NORMAL + 3]
+        else:
+            least = -inf if UNKNOWN in places else least_gap(a, pose_a, b, pose_b)
+            # the solids that the surfaces may belong to are at least this far apart, or can be parted
+            if least < distance:
+                parted = least if least > 0.0 else -parting_translation(a, pose_a, b, pose_b, row[NORMAL : NORMAL + 3])
+                bound = max(bound, distance - parted)
+    unbounded = distance == -inf  # exact: no length is involved that could be wrong
+    if distance <= 0.0 and (a.is_concave or b.is_concave) and not unbounded:
+        bound += max(parting_translation(a, pose_a, b, pose_b, row[NORMAL : NORMAL + 3]) + distance, 0.0)
+    excess = a.excess + b.excess
+    if distance <= 0.0 and excess > 0.0 and (a.stands_for_concave or b.stands_for_concave):
+        bound -= distance  # the models may overlap deeply although the concave objects are apart
+    found = Contact(distance, bound + excess, row, arguments)
+    found.__dict__.update(model_a=a.model, model_b=b.model, _bodies=(a, b))
+    return found
+
+
+def plant_bodies(a: QueryBody, b: QueryBody) -> None:
+    """Give the pieces of two objects the trees that they need beside a mesh."""
+    if a.has_mesh or b.has_mesh:
+        a.plant()
+        b.plant()
+
+
+def check_kinds(a: QueryBody, pose_a: Pose, b: QueryBody, pose_b: Pose) -> None:
+    """Raise UnsupportedError for a plane shape with a solid one, PoseError for a plane shape that is tilted."""
+    planes = {kind_of(shape).planar for side in (a, b) for shape, _ in side.shapes}
     if len(planes) > 1:
-        kinds = sorted({type(shape).__name__ for shape, _ in (*a.shapes, *b.shapes)})
+        kinds = sorted({type(shape).__name__ for side in (a, b) for shape, _ in side.shapes})
+        plane, solid = ([kind.shape.__name__ for kind in KINDS if kind.planar is it] for it in (True, False))
         raise UnsupportedError(
-            "Circle and Polygon meet each other only; supported are pairs of Circle, Polygon, or of "
-            "Sphere, Box, Capsule, Cylinder, Cone, Ellipsoid, ConvexHull, Mesh, Points, HalfSpace; "
-            f"got {', '.join(kinds)}"
+            f"{' and '.join(plane)} meet each other only; supported are pairs of {', '.join(plane)}, or of "
+            f"{', '.join(solid)}; got {', '.join(kinds)}"
         )
     if planes == {True}:
-        check_side_in_plane(a)
-        check_side_in_plane(b)
-    offset = b.pose.position - a.pose.position
-    deepest = by_clouds(a, b, offset) or by_trees(a, b, offset) or by_pieces(a, b, offset)
-    row = deepest.row
-    least = np.inf
-    if row[DISTANCE] > 0.0 and (a.is_uncertain or b.is_uncertain):
-        places = locate_in_meshes(a, b, offset), locate_in_meshes(b, a, -offset)
-        if Location.INSIDE in places:
-            turn_inward(row)
-        else:
-            least = -np.inf if UNKNOWN in places else min(distance_of_fillings(a, b), distance_of_fillings(b, a))
-    distance, bound = float(row[DISTANCE]), float(row[BOUND])
-    normal = row[NORMAL : NORMAL + 3].copy()
-    point = a.pose.position + row[POINT_A : POINT_A + 3]
-    convex = not (a.is_concave or b.is_concave)
-    unbounded = distance == -np.inf  # exact: no length is involved that could be wrong
-    if distance <= 0.0 and not convex and not unbounded:
-        bound += max(parting_translation(a, b, offset, normal) + distance, 0.0)
-    if least < distance:
-        # the solids that the surfaces may belong to are at least this far apart, or can be parted
-        bound = max(bound, distance - (least if least > 0.0 else -parting_translation(a, b, offset, normal)))
-    excess = a.excess + b.excess
-    if distance <= 0.0 and excess > 0.0 and not all(len(exact_piece_table(side.shapes)) == 1 for side in (a, b)):
-        bound -= distance  # the models may overlap deeply although the concave objects are apart
-    made = Contact(
-        signed_distance=distance,
-        error_bound=bound + excess,
-        normal=normal,
-        point_a=point,
-        point_b=point.copy() if unbounded else point + distance * normal,
-        model_a=a.model,
-        model_b=b.model,
-        _find=None if unbounded else deepest.pieces,
-    )
-    vars(made)["_arguments"] = shape_a, pose_a, shape_b, pose_b
-    return made
-
-
-def contact_of_row(
-    quick: tuple[float, float | None, Array], arguments: tuple[Compound, Pose, Compound, Pose]
-) -> Contact:
-    """Contact of a row. Its arrays are made when they are read, which takes as long as the kernel.
-
-    So is a bound that is None, because it takes longer than the distance.
-    """
-    distance, bound, row = quick
-    made = _new(Contact)
-    known = {"signed_distance": distance, "_row": row, "_arguments": arguments}
-    if bound is not None:
-        known["error_bound"] = bound
-    _set(made, "__dict__", known)
-    return made
-
-
-def _nearest(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose) -> NearestPieces:
-    """Search for the nearest pieces of exact shapes, relative to A's origin."""
-    a, b = posed(shape_a, pose_a, Model.EXACT, "A"), posed(shape_b, pose_b, Model.EXACT, "B")
-    offset = b.pose.position - a.pose.position
-    return nearest_pieces(a, b, offset)
+        check_in_plane(pose_a)
+        check_in_plane(pose_b)

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.contact_features import FeatureType
 from collision_monitor.geometry.coordinates import Array
-from collision_monitor.query.arguments import Compound
 from collision_monitor.query.contact.features import feature_of, shape_tie
+from collision_monitor.shapes.compound import Compound
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Box, ConvexHull, Mesh, Points, Shape
 

@@ -8,22 +8,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.impact.body_contact import RESULT
+from collision_monitor.impact.mesh_pair import SOLIDS
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.query.batch_result import BatchResult, Pairs
-from collision_monitor.query.contact.contact import Contact, contact, contact_of_row
-from collision_monitor.query.contact.contact_rows import contact_rows
-from collision_monitor.query.contact.convex_pairs import MEMORY
+from collision_monitor.query.contact.contact import Contact, contact
+from collision_monitor.query.contact.contact_kernel import MEMORY, contacts_of_chains
+from collision_monitor.query.library import LIBRARY
 from collision_monitor.query.pair_arrays import (
     Progress,
     Shapes,
-    pack_shapes,
+    batch_shapes,
     pair_count,
     pair_ranges,
     part,
     pose_of,
     pose_rows,
 )
-from collision_monitor.shapes.pose import Pose
 
 Array = NDArray[np.float64]
 
@@ -75,13 +76,13 @@ class Contacts(BatchResult[Contact]):
     def _one(self, k: int) -> Contact:
         shape_a, x_a, shape_b, x_b = self._pairs.of(self._number[k])
         if self._is_single[k]:
-            return contact(shape_a, _pose(x_a), shape_b, _pose(x_b))
+            return contact(shape_a, pose_of(x_a), shape_b, pose_of(x_b))
         row = np.zeros(CONTACT_SIZE)
         row[DISTANCE], row[BOUND] = self.signed_distance[k], self.error_bound[k]
         for column, values in ((NORMAL, self.normal), (POINT_A, self.point_a), (POINT_B, self.point_b)):
             row[column : column + 3] = values[k]
-        quick = float(row[DISTANCE]), float(row[BOUND]), row
-        return contact_of_row(quick, (shape_a, pose_of(x_a), shape_b, pose_of(x_b)))
+        arguments = shape_a, pose_of(x_a), shape_b, pose_of(x_b)
+        return Contact(float(row[DISTANCE]), float(row[BOUND]), row, arguments)
 
 
 def contacts(
@@ -89,9 +90,9 @@ def contacts(
 ) -> Contacts:
     """`contact` for N pairs: of the shapes A at the poses A with the shapes B at the poses B.
 
-    shapes: one for all pairs, or a list of N; poses: (N, 7) x y z qx qy qz qw (m), a list of N Pose, or one for all.
-    progress: called with the number of pairs that are done. Convex solids run in one kernel, 0.1 to 1 µs a pair; a pair
-    with another shape takes as long as `contact`. Raises as `contact` does, and InputError if the lengths differ.
+    shapes: one for all pairs, or a list of N; poses: (N, 7) x y z qx qy qz qw (m), a list of N, or one for all.
+    progress: called with the number of pairs that are done. Convex solids take 0.1 to 1 µs a pair; compounds, open
+    meshes and meshes that overlap take as long as `contact`. Raises as `contact` does; InputError if lengths differ.
 
     >>> import collision_monitor as cm
     >>> poses = [(x, 0, 0, 0, 0, 0, 1) for x in (0.5, 1.5, 2.5)]
@@ -101,31 +102,27 @@ def contacts(
     >>> found
     Contacts(3 pairs, 1 overlap, nearest: pair 0, -0.5 m)
     """
-    a, b = pack_shapes(shapes_a, "shapes A"), pack_shapes(shapes_b, "shapes B")
+    a, b = batch_shapes(shapes_a, "shapes A"), batch_shapes(shapes_b, "shapes B")
     x_a, x_b = pose_rows(poses_a, "poses A"), pose_rows(poses_b, "poses B")
     count = pair_count(shapes_a=len(a), poses_a=len(x_a), shapes_b=len(b), poses_b=len(x_b))
-    is_special = np.broadcast_to((a.at < 0) | (b.at < 0), (count,))
-    special = np.flatnonzero(is_special)
-    at_a, at_b = np.maximum(a.at, 0), np.maximum(b.at, 0)
-    memory = MEMORY.enlarge(a.rows, b.rows)
-    rows = np.zeros((count, CONTACT_SIZE))
+    if a.has_mesh or b.has_mesh:
+        a.plant()
+        b.plant()
+    are_convex = np.broadcast_to(a.is_convex & b.is_convex, (count,))
+    is_single = np.broadcast_to((a.first < 0) | (b.first < 0), (count,)).copy()
+    rows = np.zeros((count, RESULT))
     for which in pair_ranges(count, progress):
-        begin, end = np.searchsorted(special, (which.start, which.stop))
-        if end - begin < which.stop - which.start and len(a.rows) and len(b.rows):
-            contact_rows(
-                a.rows, part(at_a, which), part(x_a, which), b.rows, part(at_b, which), part(x_b, which),
-                memory, rows[which],
-            )  # fmt: skip
-        for k in special[begin:end].tolist():
-            poses = (_pose(x[k if len(x) > 1 else 0]) for x in (x_a, x_b))
+        contacts_of_chains(
+            *LIBRARY.tuples, MEMORY.scratch, part(a.first, which), part(x_a, which), part(b.first, which),
+            part(x_b, which), SOLIDS, rows[which],
+        )  # fmt: skip
+        is_single[which] |= ~are_convex[which] & (rows[which, DISTANCE] <= 0.0)
+        for k in (which.start + np.flatnonzero(is_single[which])).tolist():
+            poses = (pose_of(x[k if len(x) > 1 else 0]) for x in (x_a, x_b))
             one = contact(a.of(k), next(poses), b.of(k), next(poses))
             rows[k, DISTANCE], rows[k, BOUND] = one.signed_distance, one.error_bound
             for column, value in ((NORMAL, one.normal), (POINT_A, one.point_a), (POINT_B, one.point_b)):
                 rows[k, column : column + 3] = value
     normal, point_a, point_b = (rows[:, column : column + 3] for column in (NORMAL, POINT_A, POINT_B))
     pairs = Pairs(a, x_a, b, x_b)
-    return Contacts(rows[:, DISTANCE], rows[:, BOUND], normal, point_a, point_b, pairs, np.arange(count), is_special)
-
-
-def _pose(row: Array) -> Pose:
-    return Pose(row[:3], row[3:])
+    return Contacts(rows[:, DISTANCE], rows[:, BOUND], normal, point_a, point_b, pairs, np.arange(count), is_single)

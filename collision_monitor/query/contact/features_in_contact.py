@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.contact_features import FeatureContact
-from collision_monitor.query.arguments import checked_pose
 from collision_monitor.query.contact.contact import Contact
 from collision_monitor.query.contact.features import feature_of, shape_tie
-from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.pose import as_pose
 from collision_monitor.shapes.registry import Shape
 
 
-def contact_features(contact: Contact, shape_a: Shape, pose_a: Pose, shape_b: Shape, pose_b: Pose) -> FeatureContact:
+def contact_features(contact: Contact, shape_a: Shape, pose_a: Any, shape_b: Shape, pose_b: Any) -> FeatureContact:
     """Features of A and of B at the witness points of their contact, for shapes with vertices, edges or faces.
 
     A mesh keeps its own numbers of vertices and faces. A hull has the vertex numbers of its points and the face numbers
@@ -26,8 +27,7 @@ def contact_features(contact: Contact, shape_a: Shape, pose_a: Pose, shape_b: Sh
     >>> cm.contact_features(cm.contact(box, pose, box, above), box, pose, box, above).a.type.name
     'FACE'
     """
-    checked_pose(pose_a, "pose_a")
-    checked_pose(pose_b, "pose_b")
+    pose_a, pose_b = as_pose(pose_a, "pose A"), as_pose(pose_b, "pose B")
     if not isinstance(contact, Contact):
         raise InputError(f"contact: expected the result of `contact` of the two shapes, got {contact!r:.100}")
     tie = shape_tie(shape_a, shape_b)

@@ -13,9 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor.geometry.bounded_cache import bounded_cache
-from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.geometry.oriented_boxes import obb_minimum_volume
-from collision_monitor.meshes.trees.shape_trees import kept_tree
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Box, ConvexHull, Mesh, Shape
 from collision_monitor.shapes.shape import array_bytes
@@ -51,25 +49,6 @@ def _filling(mesh: Mesh) -> tuple[tuple[Box, Pose], ...]:
     size = np.maximum(size, LEAST_THICKNESS * size.max())
     pose = Pose(box.center, Rotation.from_matrix(box.rotation).as_quat())
     return ((Box(size + ROUNDED_UP * size.max()), pose),)
-
-
-MOST_FILLED: Final = 20_000
-"""Most faces of a mesh that is copied with its filling. More: the copy takes longer than the searches that it saves."""
-
-
-@bounded_cache(REMEMBERED_FILLINGS, lambda found, mesh: array_bytes(mesh) + (array_bytes(found) if found else 0))
-def filled_mesh(mesh: Mesh) -> Mesh | None:
-    """The surface of an open mesh and the box around its hole as one; None for more than MOST_FILLED faces.
-
-    Its tree has a branch for each: the large faces of the box would enlarge the boxes of small ones beside them.
-    """
-    if len(mesh.faces) > MOST_FILLED or (filled := filled_box(mesh)) is None:
-        return None
-    box = convex_hull(filled.hull.points)
-    faces = np.concatenate([mesh.faces, box.faces + len(mesh.vertices)])
-    whole = Mesh(np.concatenate([mesh.vertices, box.vertices]), faces)
-    kept_tree(whole, split=len(mesh.faces))
-    return whole
 
 
 class FilledBox(NamedTuple):

@@ -2,70 +2,91 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import product
+from math import inf
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
+from collision_monitor.geometry.inside import UNKNOWN as UNKNOWN
+from collision_monitor.geometry.inside import locate_in_welded_surface
 from collision_monitor.geometry.point_in_polygon import Location
-from collision_monitor.meshes.distance.contact import OPEN
-from collision_monitor.meshes.trees.shape_trees import trees_of_pair
-from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE
+from collision_monitor.impact.mesh_pair import SURFACES
+from collision_monitor.meshes.distance.contact import in_root_box
+from collision_monitor.meshes.trees.shape_trees import shape_tree
+from collision_monitor.query.body import PosedShapes, QueryBody, laid_out
+from collision_monitor.query.contact.contact_kernel import contact_row
 from collision_monitor.query.contact.fillings import fillings
-from collision_monitor.query.contact.nearest_or_deepest import (
-    by_clouds,
-    by_pieces,
-    by_trees,
-    contact_by_trees,
-    locate_in_meshes,
-)
-from collision_monitor.query.posed import Posed, pose_in_world
 from collision_monitor.records import Model
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.registry import Shape
+from collision_monitor.shapes.registry import Mesh, Points, kind_of
+
+INSIDE: Final = Location.INSIDE
+
+MOST_TESTS: Final = 300_000_000
+"""Most pairs of a point and a face to locate points in a mesh without a tree of its solid, 0.3 s."""
 
 
-def distance_of_fillings(a: Posed, b: Posed) -> float:
-    """Lower bound (m) of the distances of A's fillings from B and from its fillings; infinite if A has none."""
-    others = [*b.outline, *(fillings(b.shapes) if b.model is Model.EXACT else ())]
-    return _least_gap(fillings(a.shapes) if a.model is Model.EXACT else (), a.pose, others, b.pose)
-
-
-def may_be_inside(
-    inner: Sequence[tuple[Shape, Pose]], pose: Pose, outer: Sequence[tuple[Shape, Pose]], outer_pose: Pose
-) -> bool:
-    """Whether an object may be inside a mesh of another one, although their surfaces are apart."""
-    a, b = Posed(inner, pose, inner), Posed(outer, outer_pose, outer)
-    return locate_in_meshes(a, b, outer_pose.position - pose.position) != Location.OUTSIDE
-
-
-def least_gap(
-    shapes_a: Sequence[tuple[Shape, Pose]], pose_a: Pose, shapes_b: Sequence[tuple[Shape, Pose]], pose_b: Pose
-) -> float:
-    """Lower bound (m) of the distance of two objects with the fillings of open meshes, below 0 if these overlap.
-
-    It is -inf if one may be inside the other.
-    """
-    if may_be_inside(shapes_a, pose_a, shapes_b, pose_b) or may_be_inside(shapes_b, pose_b, shapes_a, pose_a):
-        return -np.inf
-    return _least_gap([*shapes_a, *fillings(shapes_a)], pose_a, [*shapes_b, *fillings(shapes_b)], pose_b)
-
-
-def _least_gap(
-    shapes_a: Sequence[tuple[Shape, Pose]], pose_a: Pose, shapes_b: Sequence[tuple[Shape, Pose]], pose_b: Pose
-) -> float:
-    """The same of all surfaces and solids, each for itself; infinite without any."""
-    offset = pose_b.position - pose_a.position
-    least = np.inf
-    for pair in product(shapes_a, shapes_b):
-        a, b = (Posed([own], pose, [own]) for own, pose in zip(pair, (pose_a, pose_b), strict=True))
-        trees = trees_of_pair(pair[0][0], pair[1][0], surface=True)
-        if trees is None:
-            row = (by_clouds(a, b, offset) or by_trees(a, b, offset) or by_pieces(a, b, offset)).row
+def inner_points(shapes: PosedShapes) -> NDArray[np.float64]:
+    """Points (n, 3) of an object in its frame (m), at least one of each connected part."""
+    found = []
+    for shape, pose in shapes:
+        if isinstance(shape, Points):
+            own = np.asarray(shape.points)
+        elif isinstance(shape, Mesh):
+            faces, part = shape.surface.faces, shape.surface.part
+            own = shape.vertices[faces[np.unique(part, return_index=True)[1], 0] if len(faces) else shape.faces[:1, 0]]
         else:
-            place_a, (R_b, p_b) = pose_in_world(a), pose_in_world(b)
-            known, row = contact_by_trees(trees, place_a, (R_b, p_b + offset))
-            if known == OPEN:
-                return -np.inf
-        least = min(least, float(row[DISTANCE] - row[BOUND]))
-    return least
+            middle = kind_of(shape).middle
+            own = np.zeros((1, 3)) if middle is None else middle(shape)[None]
+        found.append(own @ pose.rotation.T + pose.position)
+    return np.concatenate(found)
+
+
+def location_of(a: QueryBody, pose_a: Pose, b: QueryBody, pose_b: Pose) -> tuple[int, int]:
+    """Location of A in the meshes of B, and of B in those of A: OUTSIDE, INSIDE or UNKNOWN; no surfaces meet.
+
+    It is UNKNOWN where more than MOST_TESTS are needed, as for two soups of 100,000 triangles.
+    """
+    return _located(a, pose_a, b, pose_b), _located(b, pose_b, a, pose_a)
+
+
+def _located(inner: QueryBody, pose: Pose, outer: QueryBody, outer_pose: Pose) -> int:
+    found: int = Location.OUTSIDE
+    if outer.model is not Model.EXACT:
+        return found
+    points = inner_points(inner.shapes) @ pose.rotation.T + (pose.position - outer_pose.position)
+    for shape, at in outer.shapes:
+        if not isinstance(shape, Mesh):
+            continue
+        own = (points - outer_pose.rotation @ at.position) @ (outer_pose.rotation @ at.rotation)
+        tree = shape_tree(shape)
+        own = own if tree is None else own[in_root_box(tree, own)]
+        if len(own):
+            some = own[: max(MOST_TESTS // len(shape.faces), 1)]
+            location = locate_in_welded_surface(some, shape.surface)
+            if ((location == Location.INSIDE) | (location == Location.BOUNDARY)).any():
+                return Location.INSIDE
+            if len(some) < len(own) or (location == UNKNOWN).any():
+                found = UNKNOWN
+    return found
+
+
+def least_gap(a: QueryBody, pose_a: Pose, b: QueryBody, pose_b: Pose) -> float:
+    """Lower bound (m) of the distances of the fillings of A and B from each other and from the other object.
+
+    Infinite if neither has any; below 0 if they may overlap.
+    """
+    of_a, of_b = (fillings(side.shapes) if side.model is Model.EXACT else [] for side in (a, b))
+    return min(
+        _gap(of_a, pose_a, [*b.pieces, *of_b], pose_b),
+        _gap(of_b, pose_b, a.pieces, pose_a),
+    )
+
+
+def _gap(shapes_a: PosedShapes, pose_a: Pose, shapes_b: PosedShapes, pose_b: Pose) -> float:
+    if not len(shapes_a) or not len(shapes_b):
+        return inf
+    a, b = laid_out(shapes_a), laid_out(shapes_b)
+    distance, bound, _ = contact_row(a.first, pose_a, b.first, pose_b, SURFACES)
+    return distance - bound

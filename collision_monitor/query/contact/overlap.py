@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.geometry.bounding_volumes import Hull, convex_hull
@@ -11,19 +11,19 @@ from collision_monitor.geometry.lecture.cascade import polyhedra_intersect
 from collision_monitor.geometry.lecture.polygon_overlap import Evidence, polygons_intersect, sat_2d
 from collision_monitor.geometry.lecture.polyhedron_sat import sat_3d
 from collision_monitor.geometry.triangulation import convex_parts
-from collision_monitor.query.arguments import Compound, checked_pose
-from collision_monitor.query.contact.contact import contact
-from collision_monitor.query.contact.convex_pairs import packed_contact
-from collision_monitor.query.contact.mesh_pairs import mesh_overlap
-from collision_monitor.shapes.compound import shape_pairs
+from collision_monitor.meshes.trees.shape_trees import UNCERTAIN
+from collision_monitor.query.body import kept_slots
+from collision_monitor.query.contact.contact import contact, plant_for_meshes
+from collision_monitor.query.contact.contact_kernel import have_common_point
+from collision_monitor.shapes.compound import Compound, shape_pairs
 from collision_monitor.shapes.planar import flat_pose
-from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.pose import Pose, as_pose
 from collision_monitor.shapes.registry import Box, ConvexHull, Mesh, Polygon, Shape
 
 TESTS: Final = ("contact", "cascade", "sat", "edges")
 
 
-def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, test: str = "contact") -> bool:
+def overlap(shape_a: Compound, pose_a: Any, shape_b: Compound, pose_b: Any, test: str = "contact") -> bool:
     """Whether two shapes, or compounds given as lists of (shape, pose), overlap or touch.
 
     test: "contact" for any shapes, by the sign of their distance; "cascade" for polyhedra, by the lecture's ordered
@@ -36,33 +36,25 @@ def overlap(shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose, te
     >>> cm.overlap(cm.Sphere(1), cm.Pose(), cm.Sphere(1), cm.Pose((1.5, 0, 0)))
     True
     """
+    pose_a, pose_b = as_pose(pose_a, "pose A"), as_pose(pose_b, "pose B")
     if test == "contact":
-        if type(shape_a) is Mesh or type(shape_b) is Mesh:
-            if (meet := mesh_overlap(shape_a, pose_a, shape_b, pose_b)) is not None:
-                return meet
-        elif (found := packed_contact(shape_a, pose_a, shape_b, pose_b)) is not None:
-            return found[0] <= 0.0
+        a, b = kept_slots(shape_a), kept_slots(shape_b)
+        if a is not None and b is not None and a.inside != UNCERTAIN and b.inside != UNCERTAIN:
+            plant_for_meshes(a, shape_a, b, shape_b)
+            return have_common_point(a.first, pose_a, b.first, pose_b)
         return contact(shape_a, pose_a, shape_b, pose_b).overlaps
     if not isinstance(test, str) or test not in TESTS:
         raise InputError(f"test: expected one of {', '.join(TESTS)}, got {test!r}")
     if test == "edges" or (test == "sat" and any(_is_polygon(shape) for shape in (shape_a, shape_b))):
-        plane = [_polygons(shape, pose, test, name) for shape, pose, name in _named(shape_a, pose_a, shape_b, pose_b)]
+        plane = _polygons(shape_a, pose_a, test, "A"), _polygons(shape_b, pose_b, test, "B")
         if test == "edges":
             return any(polygons_intersect(a, b) is not Evidence.SEPARATE for a in plane[0] for b in plane[1])
         first, second = ([polygon[part] for polygon in side for part in convex_parts(polygon)] for side in plane)
         return any(sat_2d(a, b).overlaps for a in first for b in second)
-    solids = [_solids(shape, pose, test, name) for shape, pose, name in _named(shape_a, pose_a, shape_b, pose_b)]
+    solids = _solids(shape_a, pose_a, test, "A"), _solids(shape_b, pose_b, test, "B")
     if test == "sat":
         return any(sat_3d(a, b).overlaps for a in solids[0] for b in solids[1])
     return any(polyhedra_intersect(*a, *b).collides for a in solids[0] for b in solids[1])
-
-
-def _named(
-    shape_a: Compound, pose_a: Pose, shape_b: Compound, pose_b: Pose
-) -> tuple[tuple[Compound, Pose, str], tuple[Compound, Pose, str]]:
-    for pose, name in ((pose_a, "A"), (pose_b, "B")):
-        checked_pose(pose, f"pose {name}")
-    return (shape_a, pose_a, "A"), (shape_b, pose_b, "B")
 
 
 def _is_polygon(shape: Compound) -> bool:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
 from collision_monitor.meshes.extent import tree_extents
 from collision_monitor.meshes.trees.shape_trees import shape_tree
-from collision_monitor.query.posed import Posed
-from collision_monitor.shapes.planar import is_planar
+from collision_monitor.query.body import PosedShapes, QueryBody
+from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.reach import reach
 from collision_monitor.shapes.registry import HalfSpace, Mesh, Points
 
@@ -22,27 +22,28 @@ _DIRECTIONS: Final = np.array(
 )
 
 
-def parting_translation(a: Posed, b: Posed, offset: Array, normal: Array) -> float:
+def parting_translation(a: QueryBody, pose_a: Pose, b: QueryBody, pose_b: Pose, normal: Array) -> float:
     """Length (m) of the shortest translation that certainly parts the two, along the normal or an axis of either."""
+    sides = (a, pose_a, 1.0), (b, pose_b, -1.0)
     planes = [
-        sign * side.rotation @ pose.rotation @ shape.normal
-        for side, sign in ((a, 1.0), (b, -1.0))
-        for shape, pose in side.outline
+        sign * pose.rotation @ own.rotation @ shape.normal
+        for side, pose, sign in sides
+        for shape, own in side.pieces
         if isinstance(shape, HalfSpace)
     ]
-    axes = [_DIRECTIONS @ side.rotation.T for side in (a, b)]
+    axes = [_DIRECTIONS @ pose.rotation.T for _, pose, _ in sides]
     directions = np.concatenate([normal[None], *axes, np.reshape(planes, (-1, 3))])
-    if is_planar(a.shapes[0][0]):
+    if a.is_planar:
         directions = directions[directions[:, 2] == 0.0]
-    ends = _reach(a, directions @ a.rotation) - directions @ offset
-    return float((ends + _reach(b, -directions @ b.rotation)).min())
+    ends = _reach(a.pieces, directions @ pose_a.rotation) - directions @ (pose_b.position - pose_a.position)
+    return float((ends + _reach(b.pieces, -directions @ pose_b.rotation)).min())
 
 
-def _reach(side: Posed, directions: Array) -> Array:
+def _reach(pieces: PosedShapes, directions: Array) -> Array:
     """How far an object reaches in directions (n, 3) in its own frame (m)."""
-    shape, pose = side.outline[0]
-    tree = shape_tree(shape) if len(side.outline) == 1 and isinstance(shape, Mesh | Points) else None
+    shape, pose = pieces[0]
+    tree = shape_tree(shape) if len(pieces) == 1 and isinstance(shape, Mesh | Points) else None
     if tree is None:
-        return reach(side.outline, directions)
+        return reach(pieces, directions)
     radius = shape.radius if isinstance(shape, Points) else 0.0
     return tree_extents(tree, directions @ pose.rotation) + directions @ pose.position + radius

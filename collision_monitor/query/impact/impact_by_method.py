@@ -9,14 +9,16 @@ from typing import Final
 import numpy as np
 
 from collision_monitor.errors import InputError, UnsupportedError
-from collision_monitor.query.arguments import Compound
 from collision_monitor.query.contact.contact import contact
 from collision_monitor.query.impact.impact import Impact
 from collision_monitor.query.impact.impact_methods import METHODS, bisection, end_of_step, swept_bounds
-from collision_monitor.query.impact.moving_pair import MotionQuery, lay_out_pair, make_moving_shape
+from collision_monitor.query.impact.impact_query import MotionQuery
+from collision_monitor.query.impact.moving_body import moving_body
 from collision_monitor.records import Method
-from collision_monitor.shapes.pose import Motion
-from collision_monitor.shapes.registry import HalfSpace
+from collision_monitor.shapes.compound import Compound
+from collision_monitor.shapes.pose import Motion, Pose
+from collision_monitor.shapes.reach import reach
+from collision_monitor.shapes.registry import HalfSpace, Shape
 from collision_monitor.tolerances import GJK_TOUCHING
 
 MOST_STEPS: Final = 1_000_000
@@ -46,15 +48,15 @@ def impact_by_method(
     if query.horizon / step > MOST_STEPS:
         least = query.horizon / MOST_STEPS
         raise InputError(f"step: expected at least {least:g} s, the horizon / {MOST_STEPS}, got {step:g}")
-    sides = make_moving_shape(shape_a, motion_a, "A"), make_moving_shape(shape_b, motion_b, "B")
-    if any(len(side.shapes) > 1 or side.shapes[0][1].position.any() for side in sides):
+    sides = moving_body(shape_a, motion_a, "A"), moving_body(shape_b, motion_b, "B")
+    motion_a, motion_b = sides[0].motion, sides[1].motion
+    if any(len(side.body.shapes) > 1 or side.body.shapes[0][1].numbers != Pose().numbers for side in sides):
         raise UnsupportedError(f"method {method}: compounds are not offered; use conservative_advancement")
     if query.separation > 0.0 or motion_a.acceleration.any() or motion_b.acceleration.any():
         raise UnsupportedError(f"method {method}: no separation and no acceleration; use conservative_advancement")
     if method == "swept_sat" and (motion_a.angular.any() or motion_b.angular.any()):
         raise UnsupportedError("method swept_sat: expected boxes that do not turn; use conservative_advancement")
-    a, b = sides[0].shapes[0][0], sides[1].shapes[0][0]
-    motion_a, motion_b = sides[0].motion, sides[1].motion
+    a, b = sides[0].body.shapes[0][0], sides[1].body.shapes[0][0]
     states = [
         np.concatenate([m.pose.position, m.pose.quaternion, m.linear, m.angular])[None] for m in (motion_a, motion_b)
     ]
@@ -69,8 +71,7 @@ def impact_by_method(
     if method in ("closed_form", "swept_sat"):  # exact but for round-off
         if found == math.inf:
             return Impact("clear", math.inf, math.inf, None, number)
-        radii = lay_out_pair(*sides, query.horizon).bodies.motion["radius"]
-        slack = _round_off(float(radii[np.isfinite(radii)].sum()), motion_a, motion_b) if found > 0.0 else 0.0
+        slack = _time_of_round_off(a, motion_a, b, motion_b) if found > 0.0 else 0.0
         meeting = contact(a, motion_a.at(found), b, motion_b.at(found))
         return Impact("hit", max(found - slack, 0.0), found + slack, meeting, number)
     # the bounding spheres do not meet before; a sampling method alone would not know what it missed
@@ -85,8 +86,9 @@ def impact_by_method(
     return Impact("unresolved" if found == math.inf else "hit", min(safe, found), found, meeting, number)
 
 
-def _round_off(size: float, a: Motion, b: Motion) -> float:
+def _time_of_round_off(shape_a: Shape, a: Motion, shape_b: Shape, b: Motion) -> float:
     """Time (s) in which the shapes move by the round-off of their distance."""
+    sizes = [float(np.linalg.norm(reach([(shape, Pose())], np.eye(3)))) for shape in (shape_a, shape_b)]
     speed = float(np.linalg.norm(a.linear - b.linear))
-    far = float(np.linalg.norm(a.pose.position - b.pose.position))
-    return GJK_TOUCHING * (size + far) / speed if speed > 0.0 else 0.0
+    far = float(np.linalg.norm(a.pose.position - b.pose.position)) + sum(size for size in sizes if size < math.inf)
+    return GJK_TOUCHING * far / speed if speed > 0.0 else 0.0

@@ -1,34 +1,29 @@
 """Classical methods for the time of impact, which benchmarks/impact_methods.py compares.
 
-Each takes two convex shapes with N motions (states as in time_of_impact_batch.py, (N, 13)) and the horizon (s), and
-returns the times (N,) of the first impacts (s), infinite for none. Only conservative advancement applies to every
-motion and misses nothing. The docstrings of the others state what they require or miss. (Ericson, Real-Time Collision
-Detection, 5.5)
+Each takes two convex shapes with N motions (states (N, 13): pose x y z qx qy qz qw, linear and angular velocity) and
+the horizon (s), and returns the times (N,) of the first impacts (s), infinite for none. Only conservative advancement
+applies to every motion and misses nothing. The docstrings of the others state what they require or miss. (Ericson,
+Real-Time Collision Detection, 5.5)
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.errors import UnsupportedError
-from collision_monitor.impact.body_impact import ShapePair, contact_at, make_scratch
+from collision_monitor.impact.body_impact import ShapePair, contact_at
 from collision_monitor.impact.sphere_interval import sphere_interval
-from collision_monitor.motion.bodies import Multibody, make_bodies
-from collision_monitor.query.impact.moving_pair import (
-    ITERATIONS,
-    MotionQuery,
-    MovingShape,
-    first_impacts,
-    lay_out_pair,
-    make_moving_shape,
-)
-from collision_monitor.shapes.pose import Motion, Pose, rotation_matrix
+from collision_monitor.query.body import kept_slots
+from collision_monitor.query.impact.impact_kernel import MEMORY, impacts_of_chains, set_pair
+from collision_monitor.query.impact.impact_query import ITERATIONS
+from collision_monitor.query.library import LIBRARY
+from collision_monitor.shapes.pose import Motion, Pose
 from collision_monitor.shapes.registry import Box, HalfSpace, Shape, Sphere
 from collision_monitor.tolerances import PARALLEL_SIN2
 
@@ -42,33 +37,25 @@ HALVINGS: Final = 30
 """Number of halvings of the step in which the shapes met; 2e-11 s remain."""
 
 
-def _convex_shapes(shape_a: Shape, shape_b: Shape) -> tuple[MovingShape, MovingShape]:
-    still = Motion(Pose())
-    bodies = make_moving_shape(shape_a, still, "A"), make_moving_shape(shape_b, still, "B")
-    if any(len(body.pieces) > 1 for body in bodies):
-        raise UnsupportedError("expected convex shapes; supported are all but concave Mesh and Polygon")
-    return bodies
+class MovingShapes(NamedTuple):
+    """Two convex shapes in N motions, as the kernels take them."""
+
+    library: tuple[Any, Any]  # ShapeTable and Parts
+    motion: Any  # (2,) MOTION, memory
+    chains: tuple[np.int32, np.int32]
+    motions_a: Array  # (N, 16): pose, linear and angular velocity, acceleration
+    motions_b: Array
 
 
-def lay_out_motions(
-    a: MovingShape, b: MovingShape, state_a: Array, state_b: Array, horizon: float
-) -> tuple[Multibody, NDArray[np.int32]]:
-    """Lay out the states (N, 13) as N bodies like a and N like b, with the pairs (N, 2) of the bodies of one row."""
-    count = len(state_a)
-    two = lay_out_pair(a, b, horizon)
-    bodies = make_bodies(2 * count)
-    for k, state in enumerate((state_a, state_b)):
-        rows = slice(k * count, (k + 1) * count)
-        motion = bodies.motion[rows]
-        motion["radius"], motion["cover"] = two.bodies.motion["radius"][k], horizon
-        for column, field in enumerate(("x", "y", "z")):
-            motion[field], motion[f"v{field}"], motion[f"w{field}"] = state[:, [column, 7 + column, 10 + column]].T
-        motion["rotation"] = rotation_matrix(state[:, 3:7])
-        bodies.first_shape[rows] = two.bodies.first_shape[k]
-        bodies.spin_radius[rows] = two.bodies.spin_radius[k]
-    bodies.id[:] = np.arange(2 * count)
-    pairs = np.arange(2 * count, dtype=np.int32).reshape(2, count).T.copy()
-    return Multibody(two.table, two.parts, bodies), pairs
+def moving_shapes(shape_a: Shape, a: Array, shape_b: Shape, b: Array) -> MovingShapes:
+    """Lay out two shapes with states (N, 13)."""
+    kept = kept_slots(shape_a), kept_slots(shape_b)
+    if not all(each is not None and each.is_convex for each in kept):
+        raise UnsupportedError("expected convex shapes; supported are all but compounds, concave Mesh and Polygon")
+    chains = np.int32(kept[0].first), np.int32(kept[1].first)  # type: ignore[union-attr]
+    still = np.zeros((len(a), 3))
+    motions = np.concatenate([a, still], axis=1), np.concatenate([b, still], axis=1)
+    return MovingShapes(LIBRARY.tuples, MEMORY.motion, chains, *motions)
 
 
 def closed_form(shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: float) -> Array:
@@ -87,9 +74,8 @@ def closed_form(shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: flo
 
 def swept_bounds(shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: float) -> Array:
     """Time at which the bounding spheres first meet: a lower bound for any rotation inside them."""
-    multibody, pairs = lay_out_motions(*_convex_shapes(shape_a, shape_b), a, b, horizon)
     times = np.empty(len(a))
-    _swept_bounds(multibody.bodies.motion, pairs, horizon, times)
+    _swept_bounds(moving_shapes(shape_a, a, shape_b, b), horizon, times)
     return times
 
 
@@ -100,9 +86,8 @@ def swept_sat(shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: float
     """
     if not (isinstance(shape_a, Box) and isinstance(shape_b, Box)):
         raise UnsupportedError("swept_sat: supported is Box with Box")
-    multibody, pairs = lay_out_motions(*_convex_shapes(shape_a, shape_b), a, b, horizon)
     times = np.empty(len(a))
-    _swept_sat(multibody.table, multibody.bodies, pairs, horizon, times)
+    _swept_sat(moving_shapes(shape_a, a, shape_b, b), horizon, times)
     return times
 
 
@@ -110,20 +95,21 @@ def conservative_advancement(
     shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: float, tolerance: float = 1e-6
 ) -> Array:
     """Lower ends of the intervals of `time_of_impact`: never late, and early by what the tolerance (m) allows."""
-    multibody, pairs = lay_out_motions(*_convex_shapes(shape_a, shape_b), a, b, horizon)
-    times = np.full(len(a), math.inf)
-    events = first_impacts(multibody, pairs, 0.0, MotionQuery(horizon, tolerance, 0.0, ITERATIONS))
-    times[events["i"]] = events["lower"]
-    return times
+    (table, parts), _, chains, motions_a, motions_b = moving_shapes(shape_a, a, shape_b, b)
+    first_a, first_b = np.array(chains[:1]), np.array(chains[1:])
+    query, rows = np.array([horizon, tolerance, 0.0, ITERATIONS]), np.empty((len(a), 3))
+    impacts_of_chains(
+        table, parts, MEMORY.scratch, MEMORY.moving, first_a, motions_a, first_b, motions_b, query, rows
+    )
+    return np.ascontiguousarray(rows[:, 0])
 
 
 def bisection(
     shape_a: Shape, a: Array, shape_b: Shape, b: Array, horizon: float, step: float = STEP, halvings: int = HALVINGS
 ) -> Array:
     """Step until the shapes overlap, then bisect the last step. Contacts that begin and end in one step are missed."""
-    multibody, pairs = lay_out_motions(*_convex_shapes(shape_a, shape_b), a, b, horizon)
     times = np.empty(len(a))
-    _bisect(multibody, pairs, horizon, step, halvings, times, make_scratch())
+    _bisect(moving_shapes(shape_a, a, shape_b, b), horizon, step, halvings, times, MEMORY.scratch)
     return times
 
 
@@ -143,19 +129,21 @@ METHODS: Final[dict[str, ImpactMethod]] = {
 
 
 @kernel
-def _swept_bounds(motion: Any, pairs: Any, horizon: float, times: Any) -> None:
-    for k in range(len(pairs)):
-        A, B = motion[pairs[k, 0]], motion[pairs[k, 1]]
+def _swept_bounds(moving: Any, horizon: float, times: Any) -> None:
+    (table, parts), motion, chains, motions_a, motions_b = moving
+    for k in range(len(times)):
+        set_pair(table, parts, chains, motion, motions_a, k, motions_b, k)
+        A, B = motion[0], motion[1]
         p, v = (B.x - A.x, B.y - A.y, B.z - A.z), (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
         times[k], _ = sphere_interval(p, v, A.radius + B.radius, 0.0, horizon, 1.0)
 
 
 @kernel
-def _bisect(multibody: Any, pairs: Any, horizon: float, step: float, halvings: int, times: Any, scratch: Any) -> None:
-    table, parts, bodies = multibody
-    for k in range(len(pairs)):
-        i, j = pairs[k, 0], pairs[k, 1]
-        pair = ShapePair(bodies.motion[i], bodies.motion[j], bodies.first_shape[i], bodies.first_shape[j])
+def _bisect(moving: Any, horizon: float, step: float, halvings: int, times: Any, scratch: Any) -> None:
+    (table, parts), motion, chains, motions_a, motions_b = moving
+    pair = ShapePair(motion[0], motion[1], chains[0], chains[1])
+    for k in range(len(times)):
+        set_pair(table, parts, chains, motion, motions_a, k, motions_b, k)
         times[k] = math.inf
         count = math.ceil(horizon / step)
         for n in range(count + 1):
@@ -173,14 +161,15 @@ def _bisect(multibody: Any, pairs: Any, horizon: float, step: float, halvings: i
 
 
 @kernel
-def _swept_sat(table: Any, bodies: Any, pairs: Any, horizon: float, times: Any) -> None:
-    for k in range(len(pairs)):
-        times[k] = _first_on_all_axes(table, bodies, pairs[k, 0], pairs[k, 1], horizon)
+def _swept_sat(moving: Any, horizon: float, times: Any) -> None:
+    (table, parts), motion, chains, motions_a, motions_b = moving
+    for k in range(len(times)):
+        set_pair(table, parts, chains, motion, motions_a, k, motions_b, k)
+        times[k] = _first_on_all_axes(table, motion[0], motion[1], chains[0], chains[1], horizon)
 
 
 @device
-def _first_on_all_axes(table: Any, bodies: Any, i: int, j: int, horizon: float) -> float:
-    A, B, a, b = bodies.motion[i], bodies.motion[j], bodies.first_shape[i], bodies.first_shape[j]
+def _first_on_all_axes(table: Any, A: Any, B: Any, a: int, b: int, horizon: float) -> float:
     R, S = A.rotation, B.rotation
     p = (B.x - A.x, B.y - A.y, B.z - A.z)
     v = (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)

@@ -2,44 +2,43 @@
 
 from __future__ import annotations
 
-import math
-from functools import lru_cache
-from typing import Any
+from math import inf
+from typing import Any, Final
 
 import numpy as np
 
-from collision_monitor.checks.numbers import checked_number, checked_whole
-from collision_monitor.errors import TooCostlyError, UnsupportedError
-from collision_monitor.impact.impact_record import HIT
-from collision_monitor.meshes.trees.shape_trees import CERTAIN, kept_tree
-from collision_monitor.motion.bodies import Multibody
-from collision_monitor.query.arguments import Compound
-from collision_monitor.query.contact.contact import Contact, contact
+from collision_monitor.checks.numbers import checked_number
+from collision_monitor.errors import TooCostlyError
+from collision_monitor.geometry.point_in_polygon import Location
+from collision_monitor.impact.mesh_pair import SURFACES
+from collision_monitor.meshes.trees.shape_trees import CERTAIN
+from collision_monitor.query.body import KeptSlots, PosedShapes, QueryBody, kept_slots, laid_out
+from collision_monitor.query.contact.contact import check_kinds, contact, plant_bodies, plant_for_meshes
+from collision_monitor.query.contact.contact_kernel import contact_row
 from collision_monitor.query.contact.fillings import fillings
-from collision_monitor.query.contact.open_gap import least_gap
-from collision_monitor.query.impact.impact import (
-    CLEAR_IMPACT,
-    Impact,
-    impact_of_times,
-    timed_impact,
+from collision_monitor.query.contact.open_gap import least_gap, location_of
+from collision_monitor.query.impact.impact import CLEAR_IMPACT, Impact, impact_of_times, timed_impact
+from collision_monitor.query.impact.impact_by_method import impact_by_method
+from collision_monitor.query.impact.impact_kernel import (
+    DECIDED,
+    TOUCHES,
+    first_certain_overlap,
+    first_impact,
+    first_impact_of_touching,
 )
-from collision_monitor.query.impact.initial_contact_impact import follow
-from collision_monitor.query.impact.moving_pair import (
-    ITERATIONS,
-    MotionQuery,
-    MovingShape,
-    deep_overlap_time,
-    first_impacts,
-    in_convex_pieces,
-    lay_out_pair,
-    make_moving_shape,
-)
-from collision_monitor.query.impact.single_kernel_impact import quick_open_impact, single_kernel_impact
+from collision_monitor.query.impact.impact_query import ITERATIONS, MotionQuery, check_query
+from collision_monitor.query.impact.moving_body import MovingBody, check_bounded, moving_body, touching_pieces
 from collision_monitor.records import Method
+from collision_monitor.shapes.compound import Compound
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
-from collision_monitor.shapes.pose import Motion
-from collision_monitor.shapes.registry import HalfSpace, Mesh
+from collision_monitor.shapes.pose import Motion, as_motion
+from collision_monitor.shapes.reach import reach
+from collision_monitor.shapes.registry import Mesh
 from collision_monitor.tolerances import GJK_TOUCHING
+
+DEEPENING_TIMES: Final = 40
+"""Times tried for a certain overlap of shapes that touch at the start, each half of the one before: down to 1e-12 of
+the horizon."""
 
 
 def time_of_impact(
@@ -73,111 +72,120 @@ def time_of_impact(
     """
     query = check_query(horizon, tolerance, separation, iterations)
     if method != "conservative_advancement":
-        from collision_monitor.query.impact.impact_by_method import impact_by_method  # which loads the other kernels
-
         duration = checked_number(step, "step", least=0.0, above=True)
         return impact_by_method(shape_a, motion_a, shape_b, motion_b, query, method, duration)
-    arguments = shape_a, motion_a, shape_b, motion_b
-    is_open = _is_open(shape_a) or _is_open(shape_b)
-    quick = (quick_open_impact if is_open else single_kernel_impact)(*arguments, query)
-    if quick is not None:
-        return impact_of_times(quick, arguments)
-    a, b = make_moving_shape(shape_a, motion_a, "A"), make_moving_shape(shape_b, motion_b, "B")
-    check_bounded(a, b)
-    found = _first_impact(a, b, query)
-    if all(shape.surface.certain for body in (a, b) for shape, _ in body.shapes if isinstance(shape, Mesh)):
-        return found
-    possible = _first_possible_impact(a, b, query) if found.lower > 0.0 else 0.0
-    return found if possible >= found.lower else timed_impact(possible, found.upper, found.method, arguments)
+    motion_a, motion_b = as_motion(motion_a, "motion A"), as_motion(motion_b, "motion B")
+    kept_a, kept_b = kept_slots(shape_a), kept_slots(shape_b)
+    if kept_a is not None and kept_b is not None and _is_answered(kept_a, motion_a, kept_b, motion_b):
+        plant_for_meshes(kept_a, shape_a, kept_b, shape_b)
+        lower, upper, code = first_impact(kept_a.first, motion_a, kept_b.first, motion_b, query)
+        if code == DECIDED:
+            return impact_of_times((lower, upper), (shape_a, motion_a, shape_b, motion_b))
+    a, b = moving_body(shape_a, motion_a, "A"), moving_body(shape_b, motion_b, "B")
+    check_bounded(a.body, b.body)
+    check_kinds(a.body, a.motion.pose, b.body, b.motion.pose)
+    plant_bodies(a.body, b.body)
+    return _first_impact(a, b, query, (shape_a, motion_a, shape_b, motion_b))
 
 
-def _is_open(shape: Compound) -> bool:
-    """Whether it is a mesh with an uncertain inside."""
-    return type(shape) is Mesh and kept_tree(shape).inside != CERTAIN
+def _is_answered(a: KeptSlots, motion_a: Motion, b: KeptSlots, motion_b: Motion) -> bool:
+    """Whether the kernel's answer is the whole one: no open mesh, and no half-space that turns or meets another one."""
+    are_bounded = a.is_bounded or (b.is_bounded and not motion_a.angular.any())
+    return a.inside == b.inside == CERTAIN and are_bounded and (b.is_bounded or not motion_b.angular.any())
 
 
-def _round_off(multibody: Multibody) -> float:
-    """Depth (m) of two bodies up to which they only touch."""
-    radii = multibody.bodies.motion["radius"]
-    return GJK_TOUCHING * float(radii[np.isfinite(radii)].sum())
-
-
-def _first_possible_impact(a: MovingShape, b: MovingShape, query: MotionQuery) -> float:
-    """First time (s) at which the solids of open meshes may meet; infinite for never."""
-    gap = least_gap(a.shapes, a.motion.pose, b.shapes, b.motion.pose)
-    a, b = (make_moving_shape([*s.shapes, *fillings(s.shapes)], s.motion, "filled") for s in (a, b))
-    multibody = lay_out_pair(a, b, query.horizon)
-    if gap < query.separation - _round_off(multibody):
-        return 0.0
-    events = first_impacts(multibody, np.array([[0, 1]], np.int32), 0.0, query)
-    if len(events) and events[0]["lower"] <= 0.0:
-        return _first_impact(a, b, query, uncertain=True).lower
-    return float(events[0]["lower"]) if len(events) else math.inf
-
-
-def _may_overlap(a: MovingShape, b: MovingShape, start: Contact, separation: float, round_off: float) -> bool:
-    """Whether concave solids whose surfaces touch may overlap: where faces lie in one plane, no depth shows."""
-    if separation != 0.0 or start.signed_distance > round_off:
-        return False
-    meshes = [shape for body in (a, b) for shape, _ in body.shapes if is_concave_mesh(shape)]
-    is_known = all(isinstance(shape, Mesh) and shape.surface.certain and shape.surface.closed for shape in meshes)
-    return bool(meshes) and is_known and start.signed_distance - start.error_bound < -round_off
-
-
-def _first_impact(a: MovingShape, b: MovingShape, query: MotionQuery, uncertain: bool = False) -> Impact:
-    """First impact of the shapes, of an open mesh its surface; `uncertain`: a possible overlap at the start counts."""
-    start = contact(a.shapes, a.motion.pose, b.shapes, b.motion.pose)
-    multibody = lay_out_pair(a, b, query.horizon)
-    round_off = _round_off(multibody)
-    least = start.signed_distance - (start.error_bound if uncertain else 0.0)
-    if least < query.separation - round_off:
-        return Impact("hit", 0.0, 0.0, start)
-    arguments = a.shapes, a.motion, b.shapes, b.motion
-    if _may_overlap(a, b, start, query.separation, round_off):
-        upper = deep_overlap_time(multibody, query, round_off)
-        if upper <= 0.0:
-            return Impact("hit", 0.0, 0.0, start)
-        return timed_impact(0.0, upper, Method.CONSERVATIVE_ADVANCEMENT, arguments)
-    events = first_impacts(multibody, np.array([[0, 1]], np.int32), 0.0, query)
-    if not len(events):
+def _first_impact(a: MovingBody, b: MovingBody, query: MotionQuery, arguments: tuple[Any, Any, Any, Any]) -> Impact:
+    """First impact of any two objects; of an open mesh, lower is that of the solids which it may belong to."""
+    lower, upper, method = _impact_of_surfaces(a, b, query)
+    if lower > 0.0 and not a.body.inside == b.body.inside == CERTAIN:
+        lower = min(lower, _first_possible_impact(a, b, query))
+    if lower == inf:
         return CLEAR_IMPACT
-    lower = float(events[0]["lower"])
-    upper = float(events[0]["upper"]) if events[0]["status"] == HIT else math.inf
-    if lower <= 0.0:
-        near = query.separation + 2.0 * query.tolerance + 2.0 * round_off
-        try:
-            lower, upper = follow(in_convex_pieces(a, b, near), in_convex_pieces(b, a, near), query, round_off)
-        except TooCostlyError:
-            lower, upper = 0.0, math.inf
-        sure = deep_overlap_time(multibody, query, round_off)
+    return timed_impact(lower, upper if upper <= query.horizon else inf, method, arguments)
+
+
+def _impact_of_surfaces(a: MovingBody, b: MovingBody, query: MotionQuery) -> tuple[float, float, Method]:
+    """Lower, upper (s), infinite for none, and method of an impact of the surfaces of open meshes, else of solids."""
+    first_a, first_b = a.body.slots.first, b.body.slots.first
+    start = _certain_start(a, b, query)
+    if start is not None:
+        return start
+    lower, upper, code = first_impact(first_a, a.motion, first_b, b.motion, query)
+    if code == TOUCHES:
+        lower, upper = _followed(a, b, query)
+        sure = first_certain_overlap((first_a, first_b), (a.motion, b.motion), query)
         if sure < lower:  # triangles that start in one plane go through each other, and do not meet again
             lower = 0.0
         upper = min(upper, sure)
-        if lower == math.inf:
-            return CLEAR_IMPACT
-    upper = upper if upper <= query.horizon else math.inf
-    return timed_impact(lower, upper, Method(int(events[0]["method"])), arguments)
+    return lower, upper, Method.CONSERVATIVE_ADVANCEMENT
 
 
-def check_query(horizon: float, tolerance: float, separation: float, iterations: int) -> MotionQuery:
-    """Check the parameters of the query. Raises InputError."""
+def round_off_of(a: QueryBody, b: QueryBody) -> float:
+    """Depth (m) of two objects up to which they only touch."""
+    radii = [float(np.linalg.norm(reach(side.pieces, np.eye(3)))) for side in (a, b)]
+    return GJK_TOUCHING * sum(radius for radius in radii if radius < inf)
+
+
+def _certain_start(a: MovingBody, b: MovingBody, query: MotionQuery) -> tuple[float, float, Method] | None:
+    """The impact of objects of which one is inside the other at the start, or that may be: no depth shows that."""
+    method = Method.CONSERVATIVE_ADVANCEMENT
+    if not (a.body.has_mesh or b.body.has_mesh):
+        return None
+    found = contact(a.body.shapes, a.motion.pose, b.body.shapes, b.motion.pose)
+    round_off = round_off_of(a.body, b.body)
+    if found.signed_distance < query.separation - round_off:
+        return 0.0, 0.0, method
+    concave = [shape for side in (a, b) for shape, _ in side.body.shapes if is_concave_mesh(shape)]
+    is_known = all(isinstance(each, Mesh) and each.surface.certain and each.surface.closed for each in concave)
+    touch = query.separation == 0.0 and found.signed_distance <= round_off
+    if concave and is_known and touch and found.signed_distance - found.error_bound < -round_off:
+        # faces of concave solids in one plane: they may overlap, although no depth shows
+        sure = first_certain_overlap((a.body.slots.first, b.body.slots.first), (a.motion, b.motion), query)
+        return 0.0, 0.0 if sure <= 0.0 else sure, method
+    return None
+
+
+def _followed(a: MovingBody, b: MovingBody, query: MotionQuery) -> tuple[float, float]:
+    """Lower and upper (s) of objects that touch at the start, piece by piece."""
+    near = query.separation + 2.0 * query.tolerance + 2.0 * round_off_of(a.body, b.body)
     try:
-        return _checked(horizon, tolerance, separation, iterations)
-    except TypeError:  # of what has no hash
-        return _checked.__wrapped__(horizon, tolerance, separation, iterations)
+        pieces = laid_out(touching_pieces(a, b, near)), laid_out(touching_pieces(b, a, near))
+        chains, motions = (a.body.slots.first, b.body.slots.first), (a.motion, b.motion)
+        lower, upper = first_impact_of_touching(chains, motions, pieces, query)
+    except TooCostlyError:
+        lower, upper = 0.0, inf
+    if lower < inf == upper:
+        upper = _sampled_overlap(a, b, query)
+    return lower, upper
 
 
-@lru_cache(maxsize=16, typed=True)
-def _checked(horizon: Any, tolerance: Any, separation: Any, iterations: Any) -> MotionQuery:
-    return MotionQuery(
-        horizon=checked_number(horizon, "horizon", least=0.0),
-        tolerance=checked_number(tolerance, "tolerance", least=0.0, above=True),
-        separation=checked_number(separation, "separation", least=0.0),
-        iterations=checked_whole(iterations, "iterations"),
-    )
+def _sampled_overlap(a: MovingBody, b: MovingBody, query: MotionQuery) -> float:
+    """An early one of some times (s) at which the objects are certainly deeper than round-off, or infinity."""
+    wanted, found = query.separation - 2.0 * round_off_of(a.body, b.body), inf
+    for t in query.horizon * 0.5 ** np.arange(DEEPENING_TIMES):
+        poses = a.motion.at(t), b.motion.at(t)
+        distance, _, _ = contact_row(a.body.slots.first, poses[0], b.body.slots.first, poses[1], SURFACES, wanted)
+        if distance < wanted:
+            found = float(t)
+        elif found < inf:
+            break
+    return found
 
 
-def check_bounded(a: MovingShape, b: MovingShape) -> None:
-    """Raise UnsupportedError if both bodies are unbounded."""
-    if all(any(isinstance(s, HalfSpace) for s, _ in body.shapes) for body in (a, b)):
-        raise UnsupportedError("two HalfSpaces: expected one at most; every other shape meets a HalfSpace")
+def _first_possible_impact(a: MovingBody, b: MovingBody, query: MotionQuery) -> float:
+    """First time (s) at which the solids of open meshes may meet; infinite for never."""
+    poses = a.motion.pose, b.motion.pose
+    places = location_of(a.body, poses[0], b.body, poses[1])
+    if any(place != Location.OUTSIDE for place in places):
+        return 0.0
+    if least_gap(a.body, poses[0], b.body, poses[1]) < query.separation - round_off_of(a.body, b.body):
+        return 0.0
+    of_a, of_b = fillings(a.body.shapes), fillings(b.body.shapes)
+    pairs: list[tuple[PosedShapes, PosedShapes]] = [(of_a, [*b.body.pieces, *of_b]), (a.body.pieces, of_b)]
+    first = inf
+    for pieces_a, pieces_b in pairs:
+        if len(pieces_a) and len(pieces_b):
+            slots = laid_out(pieces_a), laid_out(pieces_b)
+            lower, _, _ = first_impact(slots[0].first, a.motion, slots[1].first, b.motion, query)
+            first = min(first, lower)
+    return first

@@ -3,29 +3,77 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.checks.numbers import checked_rows
 from collision_monitor.errors import PoseError
-from collision_monitor.query.batch_result import Pairs
-from collision_monitor.query.contact.convex_pairs import MEMORY
-from collision_monitor.query.impact.moving_pair import ITERATIONS
-from collision_monitor.query.impact.pair_impact_rows import DECIDED, pair_impact_rows
-from collision_monitor.query.impact.time_of_impact import check_query, time_of_impact
-from collision_monitor.query.impact.time_of_impact_batch import Impacts, motion_of
+from collision_monitor.query.batch_result import BatchResult, Pairs
+from collision_monitor.query.impact.impact import Impact, impact_of_times
+from collision_monitor.query.impact.impact_kernel import MEMORY, TOUCHES, impacts_of_chains
+from collision_monitor.query.impact.impact_query import ITERATIONS, MotionQuery, check_query
+from collision_monitor.query.impact.time_of_impact import time_of_impact
+from collision_monitor.query.library import LIBRARY
 from collision_monitor.query.pair_arrays import (
+    BatchShapes,
     Progress,
     Shapes,
-    pack_shapes,
+    batch_shapes,
     pair_count,
     pair_ranges,
     part,
+    pose_of,
     pose_rows,
 )
+from collision_monitor.shapes.pose import Motion
 from collision_monitor.tolerances import LARGEST_INPUT
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Impacts(BatchResult[Impact]):
+    """Results for N motions, with the meaning of `Impact`: status (N,) of str, lower and upper (N,) in s.
+
+    `impacts[k]` is the Impact of motion k, with its contact; a slice, a mask or numbers select several motions.
+
+    >>> import collision_monitor as cm
+    >>> twists = [(-1, 0, 0, 0, 0, 0), (1, 0, 0, 0, 0, 0)]
+    >>> found = cm.times_of_impact(cm.Sphere(1), cm.Pose((3, 0, 0)), twists, cm.Sphere(1), cm.Pose(), (0,) * 6)
+    >>> found
+    Impacts(1 hit, 1 clear, 0 unresolved; first: 0, 1 s)
+    >>> found[0]
+    Impact(hit in 1 to 1 s)
+    """
+
+    status: NDArray[np.str_]
+    lower: Array
+    upper: Array
+    _pairs: Pairs
+    _number: NDArray[np.intp]  # (N,), in _pairs
+    _is_single: NDArray[np.bool_]  # (N,): made by `time_of_impact`
+    _query: MotionQuery
+
+    def __len__(self) -> int:
+        """Number of motions."""
+        return len(self.status)
+
+    def __repr__(self) -> str:
+        """Return a line for a person."""
+        counts = ", ".join(f"{np.count_nonzero(self.status == each)} {each}" for each in ("hit", "clear", "unresolved"))
+        if (self.lower < math.inf).any():
+            counts += f"; first: {int(self.lower.argmin())}, {self.lower.min():.6g} s"
+        return f"Impacts({counts})"
+
+    def _one(self, k: int) -> Impact:
+        shape_a, state_a, shape_b, state_b = self._pairs.of(self._number[k])
+        arguments = shape_a, _motion(state_a), shape_b, _motion(state_b)
+        if self._is_single[k]:
+            return time_of_impact(*arguments, *self._query)
+        return impact_of_times((float(self.lower[k]), float(self.upper[k])), arguments)
 
 
 def times_of_impact(
@@ -43,11 +91,10 @@ def times_of_impact(
 ) -> Impacts:
     """`time_of_impact` for N pairs of moving shapes.
 
-    shapes: one for all pairs, or a list of N; poses: (N, 7) x y z qx qy qz qw (m), a list of N Pose, or one for all;
+    shapes: one for all pairs, or a list of N; poses: (N, 7) x y z qx qy qz qw (m), a list of N, or one for all;
     twists: (N, 6) vx vy vz wx wy wz (m/s, rad/s), or one for all. progress: called with the number of pairs that are
-    done. Convex solids take 0.3 to 5 µs a pair; other shapes, and those that touch at the start, 0.1 to 1 ms.
-    `time_of_impact_batch` is faster for one pair of spheres in many motions. Raises as `time_of_impact` does, and
-    InputError if the lengths differ.
+    done. Convex solids take 0.2 to 5 µs a pair; compounds, open meshes, and shapes that touch at the start, 0.1 to 1
+    ms. Raises as `time_of_impact` does, and InputError if the lengths differ.
 
     >>> import collision_monitor as cm
     >>> poses = [(x, 0, 0, 0, 0, 0, 1) for x in (2, 2.5, 9)]
@@ -56,30 +103,47 @@ def times_of_impact(
     array(['hit', 'hit', 'clear'], dtype='<U10')
     """
     query = check_query(horizon, tolerance, separation, iterations)
-    a, b = pack_shapes(shapes_a, "shapes A"), pack_shapes(shapes_b, "shapes B")
-    states = []
-    for poses, twists, name in ((poses_a, twists_a, "A"), (poses_b, twists_b, "B")):
-        x, v = pose_rows(poses, f"poses {name}"), checked_rows(twists, 6, f"twists {name}", LARGEST_INPUT, PoseError)
-        state = np.zeros((pair_count(poses=len(x), twists=len(v)), 16))
-        state[:, :7], state[:, 7:13] = x, v
-        states.append(state)
-    s_a, s_b = states
+    a, b = batch_shapes(shapes_a, "shapes A"), batch_shapes(shapes_b, "shapes B")
+    if a.has_mesh or b.has_mesh:
+        a.plant()
+        b.plant()
+    s_a, s_b = _motions(poses_a, twists_a, "A"), _motions(poses_b, twists_b, "B")
     count = pair_count(shapes_a=len(a), motions_a=len(s_a), shapes_b=len(b), motions_b=len(s_b))
-    special = np.broadcast_to((a.at < 0) | (b.at < 0), (count,))
-    at_a, at_b = np.maximum(a.at, 0), np.maximum(b.at, 0)
-    memory, wanted = MEMORY.enlarge(a.rows, b.rows), np.array(query, dtype=np.float64)
+    turns_a, turns_b = (s[:, 10:13].any(axis=1) for s in (s_a, s_b))
+    is_refused = (~a.is_bounded & (turns_a | ~b.is_bounded)) | (~b.is_bounded & turns_b)  # by a single query
+    first_a, first_b = np.where(is_refused, np.int32(-1), a.first), b.first
+    is_single = np.broadcast_to((first_a < 0) | (first_b < 0), (count,)).copy()
     rows = np.full((count, 3), math.inf)
     for which in pair_ranges(count, progress):
-        if not special[which].all():
-            pair_impact_rows(
-                a.rows, part(at_a, which), part(s_a, which), b.rows, part(at_b, which), part(s_b, which),
-                wanted, MEMORY.impact, memory, rows[which],
-            )  # fmt: skip
-        for k in (which.start + np.flatnonzero(special[which] | (rows[which, 2] != DECIDED))).tolist():
-            motions = [motion_of(s[k if len(s) > 1 else 0]) for s in states]
-            one = time_of_impact(a.of(k), motions[0], b.of(k), motions[1], *query)
+        impacts_of_chains(
+            *LIBRARY.tuples, MEMORY.scratch, MEMORY.moving, part(first_a, which), part(s_a, which),
+            part(first_b, which), part(s_b, which), np.array(query, np.float64), rows[which],
+        )  # fmt: skip
+        is_single[which] |= rows[which, 2] == TOUCHES
+        for k in (which.start + np.flatnonzero(is_single[which])).tolist():
+            one = time_of_impact(*_arguments(a, s_a, b, s_b, k), *query)
             rows[k, :2] = one.lower, one.upper
     lower, upper, _ = rows.T
     status = np.where(lower == math.inf, "clear", np.where(upper == math.inf, "unresolved", "hit"))
-    is_single = special | (rows[:, 2] != DECIDED)
     return Impacts(status, lower.copy(), upper.copy(), Pairs(a, s_a, b, s_b), np.arange(count), is_single, query)
+
+
+time_of_impact_batch = times_of_impact
+"""The older name."""
+
+
+def _motions(poses: Any, twists: ArrayLike, name: str) -> Array:
+    """Checked poses, twists and no acceleration side by side (N, 16)."""
+    x, v = pose_rows(poses, f"poses {name}"), checked_rows(twists, 6, f"twists {name}", LARGEST_INPUT, PoseError)
+    rows = np.zeros((pair_count(**{f"poses {name}": len(x), f"twists {name}": len(v)}), 16))
+    rows[:, :7], rows[:, 7:13] = x, v
+    return rows
+
+
+def _arguments(a: BatchShapes, s_a: Array, b: BatchShapes, s_b: Array, k: int) -> tuple[Any, Motion, Any, Motion]:
+    rows = (s[k if len(s) > 1 else 0] for s in (s_a, s_b))
+    return a.of(k), _motion(next(rows)), b.of(k), _motion(next(rows))
+
+
+def _motion(row: Array) -> Motion:
+    return Motion(pose_of(row), row[7:10], row[10:13], row[13:16])

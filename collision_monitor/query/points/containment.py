@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.coordinates import Booleans, coordinates
-from collision_monitor.query.arguments import Compound, checked_pose
-from collision_monitor.shapes.compound import shape_pairs
+from collision_monitor.shapes.compound import Compound, shape_pairs
 from collision_monitor.shapes.containment import TESTS, inside
 from collision_monitor.shapes.planar import flat_pose, is_planar
-from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.pose import as_pose
 
 
-def contains(shape: Compound, pose: Pose, points: ArrayLike, test: str = "closed form") -> Booleans:
+def contains(shape: Compound, pose: Any, points: ArrayLike, test: str = "closed form") -> Booleans:
     """Whether points (..., 3) in m, in the world frame, are in a shape or a compound at a pose, or on its boundary.
 
     test: "closed form" for every shape with an inside; "ray" for polygons and polyhedra, by the parity of a ray;
@@ -28,7 +29,7 @@ def contains(shape: Compound, pose: Pose, points: ArrayLike, test: str = "closed
     >>> contains(cm.Sphere(0.5), cm.Pose(), [(0, 0, 0.4), (0, 0, 0.6)])
     array([ True, False])
     """
-    checked_pose(pose, "pose")
+    pose = as_pose(pose, "pose")
     if test not in TESTS:
         raise InputError(f"test: expected one of {', '.join(TESTS)}, got {test!r}")
     given = coordinates(points, "points")

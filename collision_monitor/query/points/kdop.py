@@ -7,8 +7,7 @@ from typing import NamedTuple
 from numpy.typing import ArrayLike
 
 from collision_monitor.objects.models import containing_kdop
-from collision_monitor.query.arguments import Compound
-from collision_monitor.shapes.compound import shape_pairs
+from collision_monitor.shapes.compound import Compound, shape_pairs
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Shape
 

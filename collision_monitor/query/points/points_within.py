@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.checks.numbers import checked_number
-from collision_monitor.errors import PoseError, ShapeError, UnsupportedError
-from collision_monitor.objects.models import exact_model
-from collision_monitor.query.arguments import Compound
-from collision_monitor.query.contact.surface_pair import points_near
-from collision_monitor.shapes.compound import shape_pairs
-from collision_monitor.shapes.planar import is_planar
-from collision_monitor.shapes.pose import Pose
+from collision_monitor.errors import ShapeError, UnsupportedError
+from collision_monitor.query.body import exact_body
+from collision_monitor.query.points.near_points import near_points
+from collision_monitor.shapes.compound import Compound
+from collision_monitor.shapes.pose import as_pose
 from collision_monitor.shapes.registry import Points
 
 
 def points_within(
-    cloud: Points, pose: Pose, shape: Compound, shape_pose: Pose, limit: float = 0.0
+    cloud: Points, pose: Any, shape: Compound, shape_pose: Any, limit: float = 0.0
 ) -> NDArray[np.bool_]:
     """Which points (n,) of a cloud are within `limit` (m) of a shape or a compound, or inside it, with their radius.
 
@@ -32,14 +32,9 @@ def points_within(
     """
     if not isinstance(cloud, Points):
         raise ShapeError(f"cloud: expected Points, got {type(cloud).__name__}")
-    for each, name in ((pose, "pose"), (shape_pose, "shape pose")):
-        if not isinstance(each, Pose):
-            raise PoseError(f"{name}: expected a Pose, got {type(each).__name__}")
-    shapes = shape_pairs(shape, "shape")
-    if any(is_planar(each) for each, _ in shapes):
-        raise UnsupportedError("points_within: expected solid shapes, got Circle or Polygon")
-    distance = checked_number(limit, "limit", least=0.0)
-    near = np.zeros(len(cloud.points), np.bool_)
-    for piece, offset in exact_model(shapes).pieces:
-        near |= points_near(cloud.points, cloud.radius, pose, piece, shape_pose @ offset, distance)
-    return near
+    pose, shape_pose = as_pose(pose, "pose"), as_pose(shape_pose, "shape pose")
+    body = exact_body(shape, "shape")
+    if body.is_planar:
+        plane = " and ".join(sorted({type(each).__name__ for each, _ in body.shapes}))
+        raise UnsupportedError(f"points_within: expected solid shapes, got {plane}")
+    return near_points(cloud, pose, body, shape_pose, checked_number(limit, "limit", least=0.0))

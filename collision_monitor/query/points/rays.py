@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,10 +10,9 @@ from numpy.typing import ArrayLike
 from collision_monitor.checks.numbers import real_array
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.coordinates import Array, Booleans, coordinates
-from collision_monitor.query.arguments import Compound, checked_pose
-from collision_monitor.shapes.compound import shape_pairs
+from collision_monitor.shapes.compound import Compound, shape_pairs
 from collision_monitor.shapes.planar import flat_pose, is_planar
-from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.pose import as_pose
 from collision_monitor.shapes.ray_casting import first_hits
 
 
@@ -38,7 +37,7 @@ class RayHits(NamedTuple):
 
 
 def cast_ray(
-    shape: Compound, pose: Pose, origin: ArrayLike, direction: ArrayLike, length: ArrayLike = np.inf
+    shape: Compound, pose: Any, origin: ArrayLike, direction: ArrayLike, length: ArrayLike = np.inf
 ) -> RayHits:
     """First points of rays on a shape, or a compound given as a list of (shape, pose), at a pose.
 
@@ -52,7 +51,7 @@ def cast_ray(
     >>> cast_ray(cm.Box((1, 1, 1)), cm.Pose(), origin=(0, 0, 2), direction=(0, 0, -1)).point
     array([0. , 0. , 0.5])
     """
-    checked_pose(pose, "pose")
+    pose = as_pose(pose, "pose")
     p, d = coordinates(origin, "origin", 3), coordinates(direction, "direction", 3)
     try:
         limit = real_array(length)

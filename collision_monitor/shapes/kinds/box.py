@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import sqrt
+from math import hypot, sqrt
 from typing import Any, Final, Self
 
 import numpy as np
@@ -148,8 +148,9 @@ def box_mass(size: tuple[float, ...], density: float) -> MassProperties | None:
 
 
 def _row(shape: Box, _: Any) -> Row:
-    half = tuple(s / 2 for s in shape.size)
-    return Row(BOX, half, float(np.linalg.norm(half)))  # size: half extents
+    x, y, z = shape.size
+    half = x / 2, y / 2, z / 2
+    return Row(BOX, half, hypot(*half))  # size: half extents
 
 
 KIND: Final = Kind(
@@ -170,5 +171,4 @@ KIND: Final = Kind(
     corners=lambda shape: shape.corners,
     farthest=lambda shape: np.array(shape.size),
     exact=True,
-    packed=True,
 )

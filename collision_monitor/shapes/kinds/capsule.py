@@ -98,5 +98,4 @@ KIND: Final = Kind(
     round=True,
     revolved=True,
     exact=True,
-    packed=True,
 )

@@ -12,7 +12,7 @@ from collision_monitor._jit import inlined
 from collision_monitor.geometry.vector import Vector
 from collision_monitor.records import ShapeType
 from collision_monitor.shapes.kind import Kind, Row, fields_of, made_of
-from collision_monitor.shapes.rays import RayInterval, ball_interval, check_in_plane
+from collision_monitor.shapes.rays import RayInterval, ball_interval, check_direction_in_plane
 from collision_monitor.shapes.shape import Array, Shape, set_positive
 from collision_monitor.shapes.surface_parts import revolved_triangles
 
@@ -49,7 +49,7 @@ def circle_support(radius: float, x: float, y: float) -> float:
 
 
 def _rays(shape: Circle, p: Array, d: Array) -> list[RayInterval]:
-    check_in_plane(d)
+    check_direction_in_plane(d)
     return [ball_interval(p * [1.0, 1.0, 0.0], d, shape.radius)]
 
 

@@ -87,5 +87,4 @@ KIND: Final = Kind(
     round=True,
     revolved=True,
     exact=True,
-    packed=True,
 )

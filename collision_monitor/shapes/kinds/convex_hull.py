@@ -112,7 +112,6 @@ KIND: Final = Kind(
     middle=lambda shape: np.asarray(shape.points.mean(axis=0)),
     scaled=lambda shape, factor: ConvexHull(factor * shape.points),
     simple=False,
-    packed=True,
 )
 
 TRIANGLE: Final = Kind(

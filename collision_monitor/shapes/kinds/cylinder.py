@@ -101,5 +101,4 @@ KIND: Final = Kind(
     round=True,
     revolved=True,
     exact=True,
-    packed=True,
 )

@@ -140,5 +140,4 @@ KIND: Final = Kind(
     farthest=lambda shape: np.eye(3)[int(np.argmax(shape.radii))],
     curved=True,
     round=True,
-    packed=True,
 )

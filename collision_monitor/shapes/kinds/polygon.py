@@ -17,7 +17,7 @@ from collision_monitor.geometry.ray_crossings import edge_hits
 from collision_monitor.geometry.round_features import feature_of_outline
 from collision_monitor.records import ShapeType
 from collision_monitor.shapes.kind import Booleans, Corners, Fields, Kind, Row
-from collision_monitor.shapes.rays import RAYS_AT_ONCE, ball_interval, check_in_plane, from_outside, row_dot
+from collision_monitor.shapes.rays import RAYS_AT_ONCE, ball_interval, check_direction_in_plane, from_outside, row_dot
 from collision_monitor.shapes.shape import Array, Shape, point_rows, positive
 from collision_monitor.shapes.surface_parts import SIDES, Triangles, outline_triangles
 
@@ -88,7 +88,7 @@ def _contains(shape: Polygon, p: Array) -> Booleans:
 
 def _first_hits(shape: Polygon, p: Array, d: Array) -> tuple[Array, Array]:
     """Nearest edge on the way. With a radius: edges moved by it to both sides, and discs about the corners."""
-    check_in_plane(d)
+    check_direction_in_plane(d)
     start = np.asarray(shape.points)
     end = np.roll(start, -1, axis=0)
     across = (end - start)[:, ::-1] * [1.0, -1.0]

@@ -75,5 +75,4 @@ KIND: Final = Kind(
     round=True,
     revolved=True,
     ball=True,
-    packed=True,
 )

@@ -78,5 +78,4 @@ KIND: Final = Kind(
     round=True,
     revolved=True,
     exact=True,
-    packed=True,
 )

@@ -190,7 +190,7 @@ def test_two_half_spaces():
     ("arguments", "error", "words"),
     [
         (("ball", Pose(), cm.Sphere(1), Pose()), cm.ShapeError, "shape A: expected a shape or a list of"),
-        ((cm.Sphere(1), (0, 0, 0), cm.Sphere(1), Pose()), cm.PoseError, "pose A: expected a Pose, got tuple"),
+        ((cm.Sphere(1), "up", cm.Sphere(1), Pose()), cm.PoseError, "pose A: expected a Pose, .*, got str"),
         (
             (cm.Circle(1), Pose(), cm.Sphere(1), Pose()),
             cm.UnsupportedError,

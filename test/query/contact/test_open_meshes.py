@@ -11,9 +11,8 @@ from processor_time import within
 
 import collision_monitor as cm
 from collision_monitor import Motion, Pose
-from collision_monitor.query.impact.moving_pair import make_moving_shape
-from collision_monitor.query.impact.single_kernel_impact import quick_open_impact, single_kernel_impact
-from collision_monitor.query.impact.time_of_impact import _first_possible_impact, check_query
+from collision_monitor.query.body import exact_body
+from collision_monitor.query.contact.open_gap import least_gap
 
 CUBE = trimesh.creation.box((2, 2, 2))
 TORUS = trimesh.creation.torus(1.0, 0.4, major_sections=12, minor_sections=8)
@@ -164,44 +163,49 @@ def scattered(rng):
     return cm.Mesh(corners.reshape(-1, 3), np.arange(120).reshape(-1, 3))
 
 
+def gap(a, pose_a, b, pose_b):
+    """How far the solids that open meshes may belong to are apart at least."""
+    return least_gap(exact_body(a, "a"), pose_a, exact_body(b, "b"), pose_b)
+
+
 PAIRS = [("soup", "soup"), ("soup", "cup"), ("cup", "cup"), ("cup", "solid"), ("soup", "solid")]
 
 
 @pytest.mark.parametrize(("a", "b"), PAIRS)
-def test_the_impact_of_what_open_meshes_may_be_is_the_same_with_and_without_the_kernels(a, b):
+def test_the_solids_that_open_meshes_may_be_meet_when_their_contacts_may_overlap(a, b):
     rng = np.random.default_rng(len(a) + 7 * len(b))
-    query = check_query(2.0, 1e-6, 0.0, 1000)
     make = {
         "soup": scattered,
         "cup": lambda rng: cm.Mesh(rng.choice([0.3, 1.0]) * CUP.vertices, CUP.faces),
         "solid": lambda rng: cm.Box((0.3, 0.2, 0.4)),
     }
     compared = 0
-    for k in range(40):
+    for k in range(60):
         A, B = make[a](rng), make[b](rng)
         start = random_pose(rng, 0.1 if k % 4 == 0 else 2.0)  # one in the other, or beside it
-        motions = (
-            Motion(random_pose(rng, 0.0), angular=rng.normal(size=3)),
-            Motion(start, -start.position, rng.normal(size=3)),
-        )
-        quick = quick_open_impact(A, motions[0], B, motions[1], query)
-        if quick is not None:
-            compared += 1
-            slow = _first_possible_impact(
-                make_moving_shape(A, motions[0], "A"), make_moving_shape(B, motions[1], "B"), query
-            )
-            surfaces = single_kernel_impact(A, motions[0], B, motions[1], query)
-            # the surfaces count besides; steps of advancement end within the tolerance
-            assert quick[0] == pytest.approx(min(slow, surfaces[0]), abs=1e-5), k
-            assert quick[1] == pytest.approx(surfaces[1], abs=1e-5), k
+        one = Motion(random_pose(rng, 0.0), angular=rng.normal(size=3))
+        other = Motion(start, -start.position, rng.normal(size=3))
+        found = cm.time_of_impact(A, one, B, other)
+
+        def least(t):
+            c = cm.contact(A, one.at(t), B, other.at(t))  # noqa: B023
+            return min(c.signed_distance - c.error_bound, gap(A, one.at(t), B, other.at(t)))  # noqa: B023
+
+        if found.lower == 0.0:
+            assert least(0.0) <= 1e-9, k
+            continue
+        compared += 1
+        last = min(found.lower, 2.0)
+        assert all(least(t) > -1e-9 for t in np.linspace(0.0, last, 9)[:-1]), k
+        if found.lower < np.inf:
+            assert least(last) < 1e-5, k
     assert compared > 10
 
 
 @pytest.mark.parametrize(("a", "b"), [("soup", "soup"), ("cup", "cup"), ("soup", "cup")])
-def test_open_meshes_that_part_or_pass_each_other_are_clear_as_their_surfaces_are(a, b):
+def test_open_meshes_that_part_or_pass_each_other_are_clear(a, b):
     rng = np.random.default_rng(5)
     make = {"soup": scattered, "cup": lambda rng: cm.Mesh(CUP.vertices, CUP.faces)}
-    query = check_query(2.0, 1e-6, 0.0, 1000)
     for _ in range(10):
         A, B = make[a](rng), make[b](rng)
         aside = 5.0 * np.eye(3)[rng.integers(3)]
@@ -209,8 +213,6 @@ def test_open_meshes_that_part_or_pass_each_other_are_clear_as_their_surfaces_ar
             Motion(Pose(), angular=rng.normal(size=3)),
             Motion(Pose(aside), rng.choice([1.0, -0.1]) * aside, rng.normal(size=3)),
         )
-        surfaces = single_kernel_impact(A, motions[0], B, motions[1], query)
-        assert quick_open_impact(A, motions[0], B, motions[1], query) == surfaces == (np.inf, np.inf)
         assert cm.time_of_impact(A, motions[0], B, motions[1]).status == "clear"
 
 

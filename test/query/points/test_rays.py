@@ -157,7 +157,7 @@ def test_the_boundary_belongs_to_the_shape() -> None:
         (lambda: cm.cast_ray(cm.Sphere(1), cm.Pose(), (0, 0, 5), (0, 0, 1), -1), cm.InputError, "length"),
         (lambda: cm.cast_ray(cm.Sphere(1), cm.Pose(), (0, 0, 5), (0, 0, 1), [1, 2]), cm.InputError, "broadcast"),
         (lambda: cm.cast_ray(cm.Circle(1), cm.Pose(), (0, 0, 5), (0, 0, 1)), cm.InputError, "plane"),
-        (lambda: cm.cast_ray(cm.Sphere(1), (0, 0, 0), (0, 0, 5), (0, 0, 1)), cm.PoseError, "Pose"),
+        (lambda: cm.cast_ray(cm.Sphere(1), (0, 0), (0, 0, 5), (0, 0, 1)), cm.PoseError, "Pose"),
         (lambda: cm.cast_ray("ball", cm.Pose(), (0, 0, 5), (0, 0, 1)), cm.ShapeError, "shape"),
         (lambda: cm.contains(cm.Sphere(1), cm.Pose(), (0, 0, np.inf)), cm.InputError, "points"),
         (lambda: cm.contains(cm.Sphere(1), cm.Pose(), (0, 0, 0), "magic"), cm.InputError, "closed form, ray, sides"),

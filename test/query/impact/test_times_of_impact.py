@@ -108,7 +108,7 @@ def test_what_touches_is_followed_here_too():
     ("change", "error", "words"),
     [
         ({"poses_a": np.zeros((2, 6))}, cm.InputError, r"poses A: expected an array \(N, 7\), got shape \(2, 6\)"),
-        ({"poses_a": "here"}, cm.InputError, "poses A: expected numbers"),
+        ({"poses_a": "here"}, cm.InputError, "poses A: expected poses as rows"),
         ({"twists_b": np.full(6, np.nan)}, cm.PoseError, "twists B: expected finite numbers"),
         (
             {"poses_b": np.zeros(7)},
@@ -118,16 +118,16 @@ def test_what_touches_is_followed_here_too():
         (
             {"poses_a": [STILL] * 2, "twists_a": np.zeros((3, 6))},
             cm.InputError,
-            "A: expected as many twists as poses, got 3",
+            "got poses A 2, twists A 3",
         ),
-        ({"poses_a": [STILL] * 2, "poses_b": [STILL] * 3}, cm.InputError, "as many motions of A as of B, got 2 and 3"),
+        ({"poses_a": [STILL] * 2, "poses_b": [STILL] * 3}, cm.InputError, "got motions_a 2, motions_b 3"),
         ({"horizon": -1}, cm.InputError, "horizon"),
-        ({"shape_a": cm.HalfSpace((0, 0, 1), 0), "twists_a": np.ones(6)}, cm.UnsupportedError, "turn"),
+        ({"shapes_a": cm.HalfSpace((0, 0, 1), 0), "twists_a": np.ones(6)}, cm.UnsupportedError, "turn"),
     ],
     ids=lambda value: "",
 )
 def test_what_is_refused(change, error, words):
-    arguments = {"shape_a": BOX, "poses_a": STILL, "twists_a": np.zeros(6)}
-    arguments |= {"shape_b": BOX, "poses_b": STILL, "twists_b": np.zeros(6)} | change
+    arguments = {"shapes_a": BOX, "poses_a": STILL, "twists_a": np.zeros(6)}
+    arguments |= {"shapes_b": BOX, "poses_b": STILL, "twists_b": np.zeros(6)} | change
     with pytest.raises(error, match=words):
         time_of_impact_batch(**arguments)

@@ -1,0 +1,131 @@
+"""First impact of two shapes that touch at the start: they part, slide, roll or rest, or they go into each other.
+
+Touching is no impact as long as one direction keeps the shapes from being deeper in each other than round-off. Along
+it, the gap is that of their support functions, and the advance is that of every impact (advance.py). So a box that
+slides on a floor is followed to the horizon in one step.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Any, Final
+
+from collision_monitor._jit import inlined, outlined
+from collision_monitor.geometry.vector import Vector, cross, dot, minus, opposite, rotate_back
+from collision_monitor.impact.advance import Placed, advance_along_axis
+from collision_monitor.impact.body_impact import AT_REST
+from collision_monitor.motion.bodies import place_shape
+from collision_monitor.motion.motion import relative_position, relative_velocity, rotation_at
+from collision_monitor.narrow_phase.contact_row import NORMAL
+from collision_monitor.narrow_phase.core import rounding
+from collision_monitor.narrow_phase.dispatch import pair_contact
+from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.shapes.calls import core_support
+from collision_monitor.shapes.kinds.half_space import HALF_SPACE
+from collision_monitor.shapes.registry import BALL, REVOLVED
+
+RESTS, PARTS, DEEPENS = range(3)
+"""What shapes do that touch: they are never deep within the window; they are apart at a time; they may go into each
+other from a time on, as far as one direction tells."""
+
+HALVINGS: Final = 60
+"""Times tried for the parting, each half of the one before: down to 1e-18 of the window."""
+
+STEPS: Final = 200
+"""Most directions along which a pair is followed. More: a rocking body may change its edge more often."""
+
+ALIGNED: Final = 1e-12
+"""Sine of an angle that counts as zero. It changes a support value by this part of the size, less than GJK_TOUCHING.
+Larger: the change comes near GJK_TOUCHING. Smaller: a wheel whose axis is rounded no longer rolls."""
+
+
+@inlined
+def _gap_along(table: Any, a: int, b: int, R_a: Any, R_b: Any, between: Vector, n: Vector) -> float:
+    """Gap (m) of two shapes along n, from their support functions; negative if they overlap along it."""
+    if table.kind[b] == HALF_SPACE:
+        own = rotate_back(R_b, opposite(n))
+        normal = table.size[b, 0], table.size[b, 1], table.size[b, 2]
+        off = minus(own, normal)
+        reach_b = table.size[b, 3] if dot(off, off) <= ALIGNED else inf
+    else:
+        d = rotate_back(R_b, opposite(n))
+        reach_b = core_support(table, b, d[0], d[1], d[2])
+    d = rotate_back(R_a, n)
+    reach_a = core_support(table, a, d[0], d[1], d[2])
+    return dot(n, between) - reach_a - reach_b - rounding(table, a) - rounding(table, b)
+
+
+@inlined
+def _turning(table: Any, s: int, R: Any, o: Vector, w: Vector, n: Vector) -> Vector:
+    """Angular velocity of a shape, without a rotation that leaves its reach along n as it is.
+
+    That is one about n, of a ball, or of a wheel on its axle.
+    """
+    across = cross(w, n)
+    if dot(across, across) <= ALIGNED * ALIGNED * dot(w, w):
+        return AT_REST
+    if o[0] == 0.0 and o[1] == 0.0 and o[2] == 0.0:
+        if BALL[table.kind[s]]:
+            return AT_REST
+        if REVOLVED[table.kind[s]]:
+            off = cross(w, (R[0, 2], R[1, 2], R[2, 2]))
+            if dot(off, off) <= ALIGNED * ALIGNED * dot(w, w):
+                return AT_REST
+    return w
+
+
+@outlined
+def touching_impact(table, parts, pair, window, skin, apart, separation, scratch):
+    """What a pair of convex shapes (ShapePair) does that touches at the begin of the window, and when (s).
+
+    Gaps count beyond the separation (m). skin (m): depth from which on it is an impact. apart (m): gap from which on
+    the shapes have parted.
+    """
+    A, B, a, b = pair
+    begin, end = window
+    R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
+    out = scratch.out
+    acceleration = (B.ax - A.ax, B.ay - A.ay, B.az - A.az)
+    w_a, w_b = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
+    t = before = begin
+    n, is_new = AT_REST, True
+    for _ in range(STEPS):
+        rotation_at(A, t, R_i)
+        rotation_at(B, t, R_j)
+        oa, ob = place_shape(table, parts, a, R_i, R_a), place_shape(table, parts, b, R_j, R_b)
+        px, py, pz = relative_position(A, B, t)
+        between = (px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2])
+        gap = 0.0 if is_new else _gap_along(table, a, b, R_a, R_b, between, n) - separation
+        if is_new or gap < -0.5 * skin:
+            pair_contact(table, a, b, PairPose(R_a, R_b, between), out, scratch.work)
+            n = (out[NORMAL], out[NORMAL + 1], out[NORMAL + 2])
+            gap, is_new = _gap_along(table, a, b, R_a, R_b, between, n) - separation, False
+            if gap < -0.5 * skin:
+                return DEEPENS, before
+        if gap > apart:
+            return PARTS, t
+        at = Placed(
+            a, b, R_a, R_b, oa, ob, (px, py, pz), relative_velocity(A, B, t), acceleration,
+            _turning(table, a, R_a, oa, w_a, n), _turning(table, b, R_b, ob, w_b, n),
+        )  # fmt: skip
+        d = advance_along_axis(table, at, n, AT_REST, 0.0, gap + skin, end - t)
+        share = 1.0
+        for _halving in range(HALVINGS):  # the latest time of these at which they are apart along the direction
+            later = t + share * d
+            if later <= t:
+                break
+            rotation_at(A, later, R_i)
+            rotation_at(B, later, R_j)
+            oa, ob = place_shape(table, parts, a, R_i, R_a), place_shape(table, parts, b, R_j, R_b)
+            px, py, pz = relative_position(A, B, later)
+            between = (px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2])
+            if _gap_along(table, a, b, R_a, R_b, between, n) - separation > apart:
+                return PARTS, later
+            share *= 0.5
+        if d >= end - t:
+            return RESTS, end
+        if t + d <= t:
+            return DEEPENS, before
+        before = t
+        t += d
+    return DEEPENS, before

@@ -1,0 +1,91 @@
+"""The library: all shapes that queries were asked about, in one shape table that the kernels read.
+
+A shape gets its slots at its first query and keeps them as long as it lives, so that later queries name it by a number.
+To lay it out in a table of its own at each query takes 100 times as long.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Sequence
+from typing import Any, Final
+
+from collision_monitor.meshes.trees.shape_trees import shape_tree
+from collision_monitor.motion.bodies import enlarge, make_parts
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.registry import Mesh, Points, Shape
+from collision_monitor.shapes.shape_table import TREE, ShapeTableBuilder
+
+FIRST_CAPACITY: Final = 256
+"""Slots of the library before it grows."""
+
+
+class Slots:
+    """Slots of the library, a chain of parts. They are free for other shapes when this object is collected."""
+
+    __slots__ = ("_free", "first", "numbers")
+
+    def __init__(self, numbers: list[int], free: deque[list[int]]) -> None:
+        self.first, self.numbers, self._free = numbers[0], numbers, free
+
+    def __del__(self) -> None:
+        self._free.append(self.numbers)  # at any time in any thread; the next `lay_out` takes them
+
+
+class Library:
+    """Slots for shapes. Safe in several threads: a kernel reads the arrays of its call, to which others only add.
+
+    tuples: the ShapeTable and Parts. arrays: theirs, one after the other, as the kernels of single queries take them.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._builder = ShapeTableBuilder(FIRST_CAPACITY)
+        self._parts = make_parts(FIRST_CAPACITY)
+        self._freed: deque[list[int]] = deque()
+        self._show()
+
+    def _show(self) -> None:
+        self.tuples = self._builder.table, self._parts
+        self.arrays: tuple[Any, ...] = (*self._builder.table, *self._parts)
+
+    def lay_out(self, pieces: Sequence[tuple[Shape, Pose | None]]) -> Slots:
+        """Give slots to the pieces of an object, each at its pose in the object's frame; None: at its origin.
+
+        Raises UnsupportedError, ShapeError as `ShapeTableBuilder.append` does.
+        """
+        trees = [shape_tree(shape) if isinstance(shape, Mesh | Points) else None for shape, _ in pieces]
+        with self._lock:
+            while self._freed:  # terminates: what is freed meanwhile is what is no longer asked about
+                for slot in self._freed.popleft():
+                    self._builder.remove(slot)
+            numbers: list[int] = []
+            try:
+                for (shape, pose), tree in zip(pieces, trees, strict=True):
+                    numbers.append(self._builder.append(shape, pose, tree=tree))
+            except BaseException:
+                for slot in numbers:
+                    self._builder.remove(slot)
+                raise
+            if len(self._parts.next) < len(self._builder.table.kind):
+                larger = make_parts(len(self._builder.table.kind))
+                enlarge(self._parts, larger)
+                self._parts = larger
+            for slot, after, (_, pose) in zip(numbers, [*numbers[1:], -1], pieces, strict=True):
+                self._parts.next[slot], self._parts.placed[slot] = after, pose is not None
+            self._show()
+            return Slots(numbers, self._freed)
+
+    def plant(self, pieces: Sequence[tuple[Shape, Pose | None]], slots: Slots) -> None:
+        """Give the convex pieces of an object the trees that their pairs with meshes need, where they have one."""
+        for (shape, _), slot in zip(pieces, slots.numbers, strict=True):
+            tree = shape_tree(shape)
+            with self._lock:
+                if tree is not None and self._builder.table.size[slot, TREE] == 0.0:
+                    self._builder.plant(slot, tree)
+                    self._show()
+
+
+LIBRARY: Final = Library()
+"""That of the process."""
