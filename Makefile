@@ -11,7 +11,7 @@ unexport PYTHONPATH
 endif
 unexport PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help setup setup-demo interfaces demo test test-core lint fuzz fuzz-files soak bench bench-peers clean
+.PHONY: help setup setup-demo interfaces demo test test-core test-fast coverage lint format docs fuzz fuzz-files soak bench bench-peers clean
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -39,6 +39,15 @@ test-core: setup ## run the tests, except those of the node and of the set-up
 lint: setup ## run ruff and mypy --strict
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
+
+format: setup ## let ruff mend and format what git has as changed, and sort its imports
+	@git diff --name-only --diff-filter=d HEAD -- '*.py' | xargs -r $(BIN)/ruff check --fix
+	@git diff --name-only --diff-filter=d HEAD -- '*.py' | xargs -r $(BIN)/ruff format
+
+docs: setup ## build the reference of the Python API into build/docs, and check every link
+	@$(BIN)/python -m sphinx -W --keep-going -q -b html docs/reference build/docs
+	@$(BIN)/python scripts/links.py build/docs
+	@$(BIN)/python scripts/links.py
 
 fuzz: setup ## attack the monitor with hostile messages; ARGS="--messages 1000000 --seed 7", --dds for a node
 	@$(BIN)/python test/attacks/fuzz_messages.py $(ARGS)
