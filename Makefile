@@ -36,9 +36,21 @@ test: interfaces ## set up, lint and run every test
 test-core: setup ## run the tests, except those of the node and of the set-up
 	@$(BIN)/python -m pytest -n auto --dist worksteal --ignore=test/ros --ignore=test/setup
 
-lint: setup ## run ruff and mypy --strict
+# What a change most likely breaks, in less than a minute: the order of the source, and what every answer goes through.
+FAST := test/test_house.py test/test_layers.py test/test_public_api.py test/test_lazy_names.py test/checks test/settings \
+	test/shapes test/codec test/motion test/monitor test/golden
+
+test-fast: setup ## run the tests of what a change most likely breaks, less than a minute
+	@$(BIN)/python -m pytest -q -n auto --dist worksteal $(FAST)
+
+coverage: setup ## run test-core, and write which lines of Python it runs into build/coverage; compiled kernels do not count
+	@$(BIN)/python -m pytest -n auto --dist worksteal --ignore=test/ros --ignore=test/setup \
+		--cov --cov-report=term --cov-report=html:build/coverage
+
+lint: setup ## run ruff, mypy --strict and codespell
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
+	@$(BIN)/codespell
 
 format: setup ## let ruff mend and format what git has as changed, and sort its imports
 	@git diff --name-only --diff-filter=d HEAD -- '*.py' | xargs -r $(BIN)/ruff check --fix
@@ -73,4 +85,4 @@ bench-peers: ## install the systems that bench compares with
 	@sh benchmarks/install_peers.sh
 
 clean: ## remove all files that the set-up or a build made
-	rm -rf .venv .venv-peers build install log .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info
+	rm -rf .venv .venv-peers build install log .coverage .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info
