@@ -85,6 +85,13 @@ def test_what_a_document_says_to_be_in_a_file_is_there(document: Path) -> None:
         assert missing == [], f"{document.name}: {file} has no {name}"
 
 
+@pytest.mark.parametrize("document", [*DOCUMENTS, ROOT / "README.md"], ids=lambda path: path.stem)
+def test_a_document_uses_no_word_that_only_this_project_knows(document: Path) -> None:
+    text = re.sub(r"`[^`]*`|^    .*$", "", document.read_text(), flags=re.MULTILINE)
+    if document.stem != "glossary":  # which defines those that are left
+        assert re.findall(r"(?i)\b(?:fore)?t(?:old|ells?)\b|\bplain(?:ly)?\b|\bsurely\b|\bquiet(?:ly)?\b", text) == []
+
+
 @pytest.mark.parametrize("document", [*DOCUMENTS, ROOT / "CONTRIBUTING.md"], ids=lambda path: path.stem)
 def test_every_file_of_the_source_that_a_document_names_exists(document: Path) -> None:
     folders = (
