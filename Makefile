@@ -52,9 +52,11 @@ lint: setup ## run ruff, mypy --strict and codespell
 	@$(BIN)/mypy
 	@$(BIN)/codespell
 
-format: setup ## let ruff mend and format what git has as changed, and sort its imports
-	@git diff --name-only --diff-filter=d HEAD -- '*.py' | xargs -r $(BIN)/ruff check --fix
-	@git diff --name-only --diff-filter=d HEAD -- '*.py' | xargs -r $(BIN)/ruff format
+CHANGED = { git diff --name-only --diff-filter=d HEAD; git ls-files --others --exclude-standard; } | grep '\.py$$'
+
+format: setup ## let ruff mend and format the Python files that git has as changed or new
+	@$(CHANGED) | xargs -r $(BIN)/ruff check --fix --force-exclude
+	@$(CHANGED) | xargs -r $(BIN)/ruff format --force-exclude
 
 docs: setup ## build the reference of the Python API into build/docs, and check every link
 	@$(BIN)/python -m sphinx -W --keep-going -q -b html docs/reference build/docs
