@@ -109,3 +109,10 @@ def test_plain_make_lists_every_target() -> None:
     listed = subprocess.run(["make", "-s"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     targets = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
     assert re.findall(r"^  make ([a-z-]+) +\S", listed, re.MULTILINE) == targets
+
+
+def test_the_tests_of_make_test_fast_exist() -> None:
+    command = subprocess.run(["make", "-n", "test-fast"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    paths = re.findall(r"\btest/\S+", command)
+    assert len(paths) > 10
+    assert [path for path in paths if not (ROOT / path).exists()] == []
