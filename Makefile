@@ -38,7 +38,7 @@ test-core: setup ## run the tests, except those of the node and of the set-up
 
 # What a change most likely breaks, in less than a minute: the order of the source, and what every answer goes through.
 FAST := test/test_house.py test/test_layers.py test/test_public_api.py test/test_lazy_names.py test/checks test/settings \
-	$(addprefix test/shapes/test_, kinds.py pairs_of_kinds.py shape_table.py) test/codec test/motion test/golden \
+	test/shapes/test_kinds.py test/codec test/motion test/golden \
 	$(addprefix test/monitor/test_, monitor.py tracking.py stages.py scene_plan.py switching.py against_queries.py result.py) \
 	$(addprefix test/monitor/contacts/test_, plain_contacts.py carried_contacts.py)
 
