@@ -11,7 +11,7 @@ unexport PYTHONPATH
 endif
 unexport PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
-.PHONY: help setup setup-demo interfaces demo test test-core lint fuzz fuzz-files soak bench bench-peers clean
+.PHONY: help setup setup-demo interfaces demo test test-core test-fast coverage lint format docs fuzz fuzz-files soak bench bench-peers clean
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -36,9 +36,34 @@ test: interfaces ## set up, lint and run every test
 test-core: setup ## run the tests, except those of the node and of the set-up
 	@$(BIN)/python -m pytest -n auto --dist worksteal --ignore=test/ros --ignore=test/setup
 
-lint: setup ## run ruff and mypy --strict
+# What a change most likely breaks, in less than a minute: the order of the source, and what every answer goes through.
+FAST := test/test_house.py test/test_layers.py test/test_public_api.py test/test_lazy_names.py test/checks test/settings \
+	test/shapes/test_kinds.py test/codec test/motion test/golden \
+	$(addprefix test/monitor/test_, monitor.py tracking.py stages.py scene_plan.py switching.py against_queries.py result.py) \
+	$(addprefix test/monitor/contacts/test_, plain_contacts.py carried_contacts.py)
+
+test-fast: setup ## run the tests of what a change most likely breaks, less than a minute
+	@$(BIN)/python -m pytest -q -n auto --dist worksteal $(FAST)
+
+coverage: setup ## run test-core, and write which lines of Python it runs into build/coverage; compiled kernels do not count
+	@$(BIN)/python -m pytest -n auto --dist worksteal --ignore=test/ros --ignore=test/setup \
+		--cov --cov-report=term --cov-report=html:build/coverage
+
+lint: setup ## run ruff, mypy --strict and codespell
 	@$(BIN)/ruff check .
 	@$(BIN)/mypy
+	@$(BIN)/codespell
+
+CHANGED = { git diff --name-only --diff-filter=d HEAD; git ls-files --others --exclude-standard; } | grep '\.py$$'
+
+format: setup ## let ruff mend and format the Python files that git has as changed or new
+	@$(CHANGED) | xargs -r $(BIN)/ruff check --fix --force-exclude
+	@$(CHANGED) | xargs -r $(BIN)/ruff format --force-exclude
+
+docs: setup ## build the reference of the Python API into build/docs, and check every link
+	@$(BIN)/python -m sphinx -W --keep-going -q -b html docs/reference build/docs
+	@$(BIN)/python scripts/links.py build/docs
+	@$(BIN)/python scripts/links.py
 
 fuzz: setup ## attack the monitor with hostile messages; ARGS="--messages 1000000 --seed 7", --dds for a node
 	@$(BIN)/python test/attacks/fuzz_messages.py $(ARGS)
@@ -64,4 +89,4 @@ bench-peers: ## install the systems that bench compares with
 	@sh benchmarks/install_peers.sh
 
 clean: ## remove all files that the set-up or a build made
-	rm -rf .venv .venv-peers build install log .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info
+	rm -rf .venv .venv-peers build install log .coverage .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info

@@ -37,7 +37,7 @@ FLOORS: tuple[tuple[tuple[str, str], ...], ...] = (
         ("view", "a page in the browser, live or of a session"),
         ("accuracy", "tradeoff, tune, extremes, timing"),
     ),
-    (("sources", "bags of other programs"), ("session", "record, read, replay, compare, check")),
+    (("sources", "messages of other programs, live or in bags"), ("session", "record, read, replay, compare, check")),
     (("pipeline", "message bytes in, monitor, message bytes out"), ("warm_up", "compile all kernels ahead")),
     (("alerts", "rules about pairs, evaluated after each step"),),
     (
@@ -62,13 +62,21 @@ FLOORS: tuple[tuple[tuple[str, str], ...], ...] = (
         ("narrow_phase", "one file per pair test, dispatch"),
         ("response", "what simulated bodies do when they meet"),
     ),
+    (("geometry.lecture", "methods of the lectures that nothing hot imports"),),
     (("shapes", "what a shape is: one file a kind, their table, poses"),),
     (
-        ("geometry", "points, polygons, polyhedra, bounds; the lectures' methods"),
+        ("geometry", "points, polygons, polyhedra, bounds"),
         ("settings", "settings and profiles"),
     ),
     (("checks", "numbers that a user or a file gives"),),
 )
+
+
+def folder(module: str) -> str:
+    """The box of a module: its folder below the package, or the inner room that stands on a floor of its own."""
+    top, _, inner = module.partition(".")[2].partition(".")
+    room = f"{top}.{inner.partition('.')[0]}"
+    return room if any(room == name for floor in FLOORS for name, _ in floor) else top
 
 
 def folder_imports() -> dict[str, list[str]]:
@@ -78,8 +86,8 @@ def folder_imports() -> dict[str, list[str]]:
         module = ".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts).removesuffix(".__init__")
         if "." not in module:
             continue
-        own = module.split(".")[1]
-        others = {other.split(".")[1] for other in direct_imports(module) if source_file(other) and "." in other}
+        own = folder(module)
+        others = {folder(other) for other in direct_imports(module) if source_file(other) and "." in other}
         found.setdefault(own, set()).update(others - {own, *GROUND})
     order = [name for floor in FLOORS for name, _ in floor]
     return {name: sorted(others, key=order.index) for name, others in found.items() if name in order}
@@ -111,24 +119,25 @@ def draw_floors() -> None:
     """Draw images/architecture.svg."""
     imports = folder_imports()
     gap, space, left, right = 18, 10, 14, WIDTH - 14
-    heights = {1: 62, 2: 76, 3: 88, 4: 118, 5: 122}  # px, by the number of boxes side by side
-    figure, axes = sheet(sum(heights[len(floor)] + gap for floor in FLOORS) + 98)
-    y = 14.0
+    texts = {}  # lines of the purpose and of the imports
     for floor in FLOORS:
-        tall = heights[len(floor)]
         width = (right - left - space * (len(floor) - 1)) / len(floor)
-        for k, (name, purpose) in enumerate(floor):
+        letters = int((width - 18) / 5.8)
+        for name, purpose in floor:
+            below = ", ".join(imports[name]) or "the ground floor only"
+            texts[name] = textwrap.wrap(purpose, letters), textwrap.wrap(f"imports {below}", letters)
+    heights = [45 + 11 * max(sum(map(len, texts[name])) for name, _ in floor) for floor in FLOORS]  # px
+    figure, axes = sheet(sum(heights) + gap * len(FLOORS) + 98)
+    y = 14.0
+    for floor, tall in zip(FLOORS, heights, strict=True):
+        width = (right - left - space * (len(floor) - 1)) / len(floor)
+        for k, (name, _) in enumerate(floor):
             x = left + k * (width + space)
             box(axes, x, y, width, tall, ROS if name in ("ros", "cli") else PLAIN)
-            axes.text(x + 9, y + 16, name, weight="bold", size=10.5, va="center", color=INK)
-            letters = int((width - 18) / 5.8)
-            lines = textwrap.wrap(purpose, letters)
-            axes.text(x + 9, y + 28, "\n".join(lines), va="top", color=INK, linespacing=1.15)
-            below = ", ".join(imports[name]) or "the ground floor only"
-            axes.text(
-                x + 9, y + tall - 6, "\n".join(textwrap.wrap(f"imports {below}", letters)),
-                va="bottom", color=QUIET, size=7.4, linespacing=1.15,
-            )  # fmt: skip
+            axes.text(x + 9, y + 16, name.replace(".", "/"), weight="bold", size=10.5, va="center", color=INK)
+            purpose, below = ("\n".join(lines) for lines in texts[name])
+            axes.text(x + 9, y + 28, purpose, va="top", color=INK, linespacing=1.15)
+            axes.text(x + 9, y + tall - 6, below, va="bottom", color=QUIET, size=7.4, linespacing=1.15)
         y += tall
         arrow(axes, (WIDTH / 2, y + 1), (WIDTH / 2, y + gap - 1))
         y += gap
@@ -137,7 +146,7 @@ def draw_floors() -> None:
     axes.text(right - 9, y + 17, "ground floor: imported by all", va="center", ha="right", color=INK)
     note = (
         "Each folder imports itself and folders on floors below. One import goes sideways: from sources to session.\n"
-        "geometry/lecture stands by itself, above shapes. Only the orange folders import ROS 2."
+        "Only the orange folders import ROS 2."
     )
     axes.text(left, y + 44, note, va="top", color=INK, linespacing=1.3)
     figure.savefig(IMAGES / "architecture.svg", metadata={"Date": None})

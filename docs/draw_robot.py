@@ -13,12 +13,11 @@ import numpy as np
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
-from collision_monitor.ros.surfaces import surface_triangles
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from collision_monitor import Cylinder, Monitor, Pose
 from collision_monitor.robots.robot import Description, Robot, make_robot
-from collision_monitor.shapes.registry import Shape
+from collision_monitor.shapes.registry import Shape, kind_of
 
 ROOT = Path(__file__).parents[1]
 SWING = (-0.2, 0.2, 0.62)  # rad of joint_1, one picture each
@@ -30,7 +29,7 @@ PLAIN, HIT, QUIET = "#a9cdf5", "#ff6f61", "#e6e6e6"
 
 def draw(axes: Any, shape: Shape, pose: Pose, color: str) -> None:
     """Draw a shape at a pose."""
-    faces = surface_triangles(shape) @ pose.rotation.T + pose.position
+    faces = kind_of(shape).triangles(shape) @ pose.rotation.T + pose.position
     axes.add_collection3d(Poly3DCollection(faces, facecolors=color, edgecolors=color, linewidths=0.1, shade=True))
 
 

@@ -1,7 +1,8 @@
-"""The examples of README.md run, the parameter table is complete, and the linked files and make targets exist."""
+"""The examples of README.md run, the parameter table is complete, and the make targets exist."""
 
 from __future__ import annotations
 
+import inspect
 import os
 import re
 import subprocess
@@ -11,13 +12,26 @@ from pathlib import Path
 import pytest
 
 from collision_monitor.settings.profile import Profile
+from collision_monitor.settings.yaml_file import read_yaml
+from collision_monitor.shapes.registry import KINDS
+from collision_monitor.sources import load_mapping
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text()
+PYTHON = (ROOT / "docs" / "python.md").read_text()
+
+
+def blocks(text: str, language: str) -> list[str]:
+    """The blocks of a Markdown text in this language."""
+    return re.findall(rf"```{language}\n(.*?)```", text, re.DOTALL)
+
+
+def test_it_can_be_read_in_four_minutes() -> None:
+    assert len(README.split()) <= 900
 
 
 def test_the_python_example_predicts_the_impact() -> None:
-    example = re.findall(r"```python\n(.*?)```", README, re.DOTALL)[0]
+    (example,) = blocks(README, "python")
     answer = subprocess.run([sys.executable, "-c", example], capture_output=True, text=True, timeout=300)
     assert answer.returncode == 0, answer.stderr
     times = re.fullmatch(r"cart meets ball in (\S+) to (\S+) s\n", answer.stdout)
@@ -26,15 +40,44 @@ def test_the_python_example_predicts_the_impact() -> None:
     assert float(times[1]) <= 1.5 <= float(times[2]) + 1e-3
 
 
-def test_the_examples_of_two_shapes_run(tmp_path: Path) -> None:
-    example = re.findall(r"```python\n(.*?)```", README, re.DOTALL)[1]
-    stand_ins = (
-        "import collision_monitor as cm; a = b = mesh_a = mesh_b = cm.Box((1, 1, 1)); pose_a = cm.Pose(); "
-        "pose_b = cm.Pose((3, 0, 0)); x = [[0.0, 0.0, 0.0]] * 8\n"
-    )
+def test_the_robot_in_five_lines_is_a_sources_file(tmp_path: Path) -> None:
+    (text,) = blocks(README, "yaml")
+    assert len(text.splitlines()) == 5
+    path = tmp_path / "robot.yaml"
+    path.write_text(text)
+    mapping = load_mapping(path)
+    assert set(mapping.topics) == {"/odom"}
+    assert read_yaml(path) == read_yaml(ROOT / "examples" / "robot_from_odometry.yaml")  # which examples run
+
+
+def test_the_names_of_commands_and_their_options_exist() -> None:
+    text = README + (ROOT / "docs" / "commands.md").read_text() + (ROOT / "docs" / "start.md").read_text()
+    named: dict[str, set[str]] = {}
+    for command, options in re.findall(r"collision-monitor ([a-z]+)([^\n#`]*)", text):
+        named.setdefault(command, set()).update(re.findall(r"--[a-z-]+", options))
+    assert {"run", "view", "replay", "salvage", "tune"} <= named.keys()
+    for command, options in named.items():
+        usage = [sys.executable, "-m", "collision_monitor", command, "--help"]
+        answer = subprocess.run(usage, capture_output=True, text=True, timeout=60)
+        assert answer.returncode == 0, answer.stderr
+        assert {option for option in options if not re.search(rf"{option}\b", answer.stdout)} == set(), command
+
+
+def test_the_table_of_shapes_names_every_kind() -> None:
+    (table,) = re.findall(r"^## Shapes\n(.*?)^## ", PYTHON, re.DOTALL | re.MULTILINE)
+    for kind in KINDS:
+        given = inspect.signature(kind.shape.__init__ if "__new__" in vars(kind.shape) else kind.shape).parameters
+        named = re.findall(rf"`{kind.shape.__name__}\(([^)]*)\)`", table)
+        assert len(named) == 1, kind.shape.__name__
+        assert set(named[0].split(", ")) <= set(given), kind.shape.__name__
+
+
+def test_the_examples_of_two_shapes_and_of_batches_run(tmp_path: Path) -> None:
+    example, batches = blocks(PYTHON, "python")
     checks = "assert i.status == 'hit' and i.lower <= 2.81 <= i.upper + 0.01\n"
+    checks_of_batches = "assert len(found) == 100_000 and found.signed_distance[-1] == 8.0\n"
     answer = subprocess.run(
-        [sys.executable, "-c", stand_ins + example + checks],
+        [sys.executable, "-c", example + checks + batches + checks_of_batches],
         cwd=tmp_path,
         env={**os.environ, "MPLBACKEND": "agg"},
         capture_output=True,
@@ -55,12 +98,6 @@ def test_the_parameter_table_has_every_setting_with_its_default(setting: Profile
     assert f"| `{setting.name}` | {text} |" in (ROOT / "docs" / "node.md").read_text()
 
 
-def test_every_linked_file_exists() -> None:
-    for document in ("README.md", "CONTRIBUTING.md", "docs/node.md", "docs/architecture.md", "docs/safety.md"):
-        for target in re.findall(r"\]\((?!http)([^)#]+)(?:#[^)]*)?\)", (ROOT / document).read_text()):
-            assert (ROOT / document).parent.joinpath(target).exists(), f"{document} links to {target}"
-
-
 def test_every_make_target_that_is_named_exists() -> None:
     targets = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE))
     for document in ("README.md", "CONTRIBUTING.md", "docs/safety.md"):
@@ -72,3 +109,10 @@ def test_plain_make_lists_every_target() -> None:
     listed = subprocess.run(["make", "-s"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
     targets = re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
     assert re.findall(r"^  make ([a-z-]+) +\S", listed, re.MULTILINE) == targets
+
+
+def test_the_tests_of_make_test_fast_exist() -> None:
+    command = subprocess.run(["make", "-n", "test-fast"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    paths = re.findall(r"\btest/\S+", command)
+    assert len(paths) > 10
+    assert [path for path in paths if not (ROOT / path).exists()] == []
