@@ -18,7 +18,7 @@ PATIENCE: Final = 300.0
 
 SOURCES: Final = f"""\
 frame: map
-rate: 30
+rate: 20
 objects:
   robot_1: {{topic: /odom, shape: {{cylinder: [{RADIUS_ROBOT}, 1.0]}}}}
   crate: {{topic: /crate, shape: {{cylinder: [{RADIUS_CRATE}, 1.0]}}}}
@@ -42,6 +42,7 @@ class Nodes:
 
     commands: (monotonic s, speed in m/s) of what the guard published, the oldest first. said: its newest state.
     others: monotonic s at which a monitor with another number than that of the last rest first answered, or None.
+    oldest: s, the largest age that an answer had, by its stamp, when the next one arrived here.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -59,6 +60,8 @@ class Nodes:
         self.commands: list[tuple[float, float]] = []
         self.said, self.others = "", None
         self._known: int | None = None
+        self.oldest = 0.0
+        self._answered: int | None = None  # stamp of the last answer, ns
         rclpy.init()
         self.node = rclpy.create_node("encounters")
         self._open()
@@ -145,7 +148,10 @@ class Nodes:
     def _on_alerts(self, data: bytes) -> None:
         from collision_monitor.codec import decode_alerts
 
-        number = decode_alerts(data).monitor
+        array = decode_alerts(data)
+        if self._answered is not None:
+            self.oldest = max(self.oldest, (self.now - self._answered) * 1e-9)
+        self._answered, number = array.stamp_ns, array.monitor
         if self._known is None:
             self._known = number
         if number != self._known and self.others is None:
@@ -154,7 +160,8 @@ class Nodes:
     def forget(self) -> None:
         """Begin anew to keep commands and to watch for other monitors."""
         self.commands.clear()
-        self.others = self._known = None
+        self.others = self._known = self._answered = None
+        self.oldest = 0.0
 
     @property
     def now(self) -> int:

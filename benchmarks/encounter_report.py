@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-NAN = "NaN in "
+FRESH = 0.25
+"""s: the guard stops for answers older than 0.3 s."""
 
 
 def _by_fault(done: Iterable[Any]) -> dict[str, list[Any]]:
@@ -44,15 +45,28 @@ def table(done: Sequence[Any]) -> list[str]:
     lines += [f"  {e.fault}, {e.scene}: {e.margin:.3f} m, contact at {e.contact:.2f} m/s: {e.said}" for e in bad]
     moved = [each for each in done if each.stops and each.stood is None]
     lines.append(f"did not stand because of the fault: {len(moved)} {[each.fault for each in moved] or ''}")
-    free = [each for each in done if each.scene == "passes"]
-    needless = [each for each in free if each.needless]
-    share = 100.0 * len(needless) / max(len(free), 1)
-    lines.append(f"needless stops where nothing is wrong: {len(needless)} of {len(free)} ({share:.1f} %)")
-    early = [each for each in done if each.scene != "passes" and each.needless]
-    lines.append(f"needless stops before a fault: {len(early)} of {len(done) - len(free)}")
-    lines += [f"  {each.fault}: {each.why_needless}" for each in (*needless, *early)]
+    lines += _needless(done)
     slow = [each for each in done if each.recovered is None]
     lines.append(f"to passing again after the fault: {_times([e.recovered for e in done])} s; never: {len(slow)}")
+    return lines
+
+
+def _needless(done: Sequence[Any]) -> list[str]:
+    """Return the figures of stops before a fault, or without one. Late answers are a fault of the machine itself."""
+    lines = []
+    for words, some in (
+        ("the answers never older than 0.25 s", [each for each in done if each.oldest <= FRESH]),
+        ("answers older than that, because the machine was busy", [each for each in done if each.oldest > FRESH]),
+    ):
+        stopped = [each for each in some if each.needless]
+        share = 100.0 * len(stopped) / max(len(some), 1)
+        beside = [each for each in some if each.scene == "passes"]
+        passes = sum(each.needless > 0 for each in beside)
+        lines.append(
+            f"needless stops before a fault, {words}: {len(stopped)} of {len(some)} ({share:.1f} %); "
+            f"of these beside the lane, without a fault: {passes} of {len(beside)}"
+        )
+        lines += [f"  {each.fault}, {each.oldest:.2f} s: {each.why_needless}" for each in stopped]
     return lines
 
 

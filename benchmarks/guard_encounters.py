@@ -31,7 +31,7 @@ from encounter_report import draw, table
 
 ACCELERATION, DECELERATION = 1.0, 1.0  # m/s^2 of the base; the guard's default is the same
 STANDS: Final = 0.01  # m/s
-TICK, STATES_EVERY, COMMANDS_EVERY = 0.01, 3, 5  # s; ticks
+TICK, STATES_EVERY, COMMANDS_EVERY = 0.02, 2, 3  # s; ticks
 AWAY: Final = 40.0  # m: where the crate rests
 GIVE_UP = 6.0  # s after a fault, and before it
 HOLD = 0.8  # s that a standstill has to last
@@ -43,7 +43,8 @@ class Outcome:
     """What an encounter showed. Times in s after the fault, lengths in m, speeds in m/s; None: it did not come to it.
 
     margin: the least of distance - braking distance while the robot moves; nearest: the least distance while it moves.
-    needless: commands to stop while nothing is wrong. recovered: s until the guard passes commands after the fault.
+    needless: commands to stop before the fault; oldest: the largest age of an answer until then. recovered: s until the
+    guard passes commands after the fault.
     """
 
     fault: str
@@ -59,9 +60,9 @@ class Outcome:
     contact: float = 0.0
     broke: bool = False
     needless: int = 0
-    free: bool = False
     said: str = ""
     why_needless: str = ""
+    oldest: float = 0.0
     recovered: float | None = None
 
 
@@ -210,6 +211,7 @@ class Encounter:
         outcome, begun = self.outcome, self._now
         while self._now - begun < GIVE_UP:
             self._step(outcome.speed)
+            outcome.oldest = self._nodes.oldest
             passed = [speed for _, speed in self._nodes.commands]
             first = next((k for k, speed in enumerate(passed) if speed > 0.0), None)
             if first is not None and (outcome.scene != "walks" or self._world.gap > 1.5):
@@ -275,7 +277,7 @@ class Encounter:
         while self._now < deadline:
             self._step(0.0)
             calm = calm + 1 if self._nodes.passes and world.v < STANDS else 0
-            if calm > 30:
+            if calm > 15:
                 return True
         return False
 
