@@ -13,8 +13,8 @@ from typing import Any, Final
 
 ROOT: Final = Path(__file__).parents[1]
 RADIUS_ROBOT, RADIUS_CRATE = 0.3, 0.25  # m
-PATIENCE: Final = 300.0
-"""s for the nodes to be ready: a first start compiles kernels."""
+PATIENCE: Final = 900.0
+"""s for the nodes to be ready: a first start compiles kernels, and other programs may need the machine."""
 
 SOURCES: Final = f"""\
 frame: map
@@ -42,7 +42,7 @@ class Nodes:
 
     commands: (monotonic s, speed in m/s) of what the guard published, the oldest first. said: its newest state.
     others: monotonic s at which a monitor with another number than that of the last rest first answered, or None.
-    oldest: s, the largest age that an answer had, by its stamp, when the next one arrived here.
+    age: s, that the answer before the last one had, by its stamp, when the last one arrived. oldest: the most of it.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -60,7 +60,7 @@ class Nodes:
         self.commands: list[tuple[float, float]] = []
         self.said, self.others = "", None
         self._known: int | None = None
-        self.oldest = 0.0
+        self.age = self.oldest = 0.0
         self._answered: int | None = None  # stamp of the last answer, ns
         rclpy.init()
         self.node = rclpy.create_node("encounters")
@@ -150,7 +150,8 @@ class Nodes:
 
         array = decode_alerts(data)
         if self._answered is not None:
-            self.oldest = max(self.oldest, (self.now - self._answered) * 1e-9)
+            self.age = (self.now - self._answered) * 1e-9
+            self.oldest = max(self.oldest, self.age)
         self._answered, number = array.stamp_ns, array.monitor
         if self._known is None:
             self._known = number

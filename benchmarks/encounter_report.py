@@ -8,6 +8,9 @@ from typing import Any
 
 import numpy as np
 
+LATE = 0.15
+"""s: most time between two ticks of a simulation that counts as real time."""
+
 FRESH = 0.25
 """s: the guard stops for answers older than 0.3 s."""
 
@@ -28,6 +31,7 @@ def _times(values: Sequence[float | None]) -> str:
 
 def table(done: Sequence[Any]) -> list[str]:
     """Return the lines of a table in Markdown, and the figures below it."""
+    played, done = done, [each for each in done if each.lag <= LATE]
     lines = [
         "| Fault | encounters | to the command to stop: median, most (s) | to standstill: median, most (s) | held "
         "| nearest (m) | least of distance − braking distance (m) |",
@@ -41,7 +45,9 @@ def table(done: Sequence[Any]) -> list[str]:
             f"| {min(e.margin for e in some):.2f} |"
         )
     bad = [each for each in done if each.margin < 0.0]
-    lines += ["", f"{len(done)} encounters; nearer than the braking distance: {len(bad)}"]
+    late = len(played) - len(done)
+    lines += ["", f"{late} more encounters are left out, because their simulation was late by more than {LATE} s"]
+    lines += [f"{len(done)} encounters; nearer than the braking distance: {len(bad)}"]
     lines += [f"  {e.fault}, {e.scene}: {e.margin:.3f} m, contact at {e.contact:.2f} m/s: {e.said}" for e in bad]
     moved = [each for each in done if each.stops and each.stood is None]
     lines.append(f"did not stand because of the fault: {len(moved)} {[each.fault for each in moved] or ''}")
@@ -72,6 +78,7 @@ def _needless(done: Sequence[Any]) -> list[str]:
 
 def draw(done: Sequence[Any], path: Path) -> None:
     """Draw the time to standstill and the least distance beyond the braking distance, one dot for each encounter."""
+    done = [each for each in done if each.lag <= LATE]
     from matplotlib.figure import Figure
 
     rows = list(_by_fault(done).items())[::-1]

@@ -27,7 +27,7 @@ from typing import Final
 import numpy as np
 from encounter_faults import Fault, History, all_faults
 from encounter_nodes import PATIENCE, RADIUS_CRATE, RADIUS_ROBOT, WHOLE_RACK, Nodes
-from encounter_report import draw, table
+from encounter_report import FRESH, LATE, draw, table
 
 ACCELERATION, DECELERATION = 1.0, 1.0  # m/s^2 of the base; the guard's default is the same
 STANDS: Final = 0.01  # m/s
@@ -35,6 +35,10 @@ TICK, STATES_EVERY, COMMANDS_EVERY = 0.02, 2, 3  # s; ticks
 AWAY: Final = 40.0  # m: where the crate rests
 GIVE_UP = 6.0  # s after a fault, and before it
 HOLD = 0.8  # s that a standstill has to last
+AGAIN: Final = 5
+"""How often an encounter is played whose simulation does not keep up."""
+
+CALM: Final = 0.8  # s for which the machine has to keep up before an encounter begins
 SHARE_WITHOUT: Final = 0.2
 
 
@@ -44,7 +48,7 @@ class Outcome:
 
     margin: the least of distance - braking distance while the robot moves; nearest: the least distance while it moves.
     needless: commands to stop before the fault; oldest: the largest age of an answer until then. recovered: s until the
-    guard passes commands after the fault.
+    guard passes commands after the fault. lag: the most time between two ticks of the simulation.
     """
 
     fault: str
@@ -63,6 +67,7 @@ class Outcome:
     said: str = ""
     why_needless: str = ""
     oldest: float = 0.0
+    lag: float = 0.0
     recovered: float | None = None
 
 
@@ -103,6 +108,7 @@ class Encounter:
         self._is_met = False  # whether the crate is there, as the monitor can know
         self._stood_at: float | None = None
         self._tick = self._applied = 0
+        self._lag = 0.0
         self._now = time.monotonic()
         if fault.stops:
             scene, speed = str(generator.choice(["stands", "walks"], p=[0.7, 0.3])), generator.uniform(0.3, 1.2)
@@ -145,6 +151,8 @@ class Encounter:
         wait = self._now + TICK - time.monotonic()
         time.sleep(max(wait, 0.001))
         until = time.monotonic()
+        self._lag = until - self._now
+        self.outcome.lag = max(self.outcome.lag, self._lag)
         while self._now < until:
             dt = min(0.005, until - self._now)
             self._now += dt
@@ -193,6 +201,7 @@ class Encounter:
         self._fault.prepare(self._nodes)
         self._rest()
         self._nodes.forget()
+        outcome.lag = 0.0
         self._applied = 0
         self._world.crate = self._world.x * np.array([1.0, 0.0]) + self._place
         if outcome.scene == "appears":
@@ -264,22 +273,27 @@ class Encounter:
         had, self._since = self._since, None
         if had is not None:
             self._fault.end(self._nodes)
-        ended = self._now
-        if self._rest():
-            self.outcome.recovered = self._now - ended
+        lag = self.outcome.lag
+        self.outcome.recovered = self._rest()
+        self.outcome.lag = lag
         return self.outcome
 
-    def _rest(self) -> bool:
-        """Stand with the crate away until the guard passes commands. Return whether it does."""
-        world, deadline = self._world, self._now + PATIENCE
+    def _rest(self) -> float | None:
+        """Stand with the crate away until the guard passes commands, and the machine keeps up for a while.
+
+        Return after how long (s) the guard passed commands; None: it did not.
+        """
+        world, begun, passed = self._world, self._now, None
         world.crate, world.walk = np.array([world.x + AWAY, 0.0]), np.zeros(2)
-        calm = 0
-        while self._now < deadline:
+        calm = 0.0
+        while self._now - begun < PATIENCE:
             self._step(0.0)
-            calm = calm + 1 if self._nodes.passes and world.v < STANDS else 0
-            if calm > 15:
-                return True
-        return False
+            stands = self._nodes.passes and world.v < STANDS
+            passed = self._now - begun if stands and passed is None else passed
+            calm = calm + self._lag if stands and self._lag < LATE and self._nodes.age < FRESH else 0.0
+            if calm > CALM:
+                break
+        return passed
 
 
 _NOTHING: Final = Fault(np.random.default_rng(0))
@@ -309,7 +323,10 @@ def play_all(count: int, seed: int, words: Path | None, results: Path | None) ->
                 task = bar.add_task("encounters", total=count)
                 for fault in drawn_faults(generator, count):
                     bar.update(task, description=f"{fault.name:<20}")
-                    done.append(Encounter(generator, fault, nodes, world).play())
+                    for _ in range(AGAIN):
+                        done.append(Encounter(generator, fault, nodes, world).play())
+                        if done[-1].lag <= LATE:
+                            break  # else the world did not move in real time
                     bar.advance(task)
                     if not sys.stderr.isatty():
                         print(_line(done[-1]), flush=True)
