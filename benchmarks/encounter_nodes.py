@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import signal
 import subprocess
@@ -42,7 +43,6 @@ class Nodes:
 
     commands: (monotonic s, speed in m/s) of what the guard published, the oldest first. said: its newest state.
     others: monotonic s at which a monitor with another number than that of the last rest first answered, or None.
-    age: s, that the answer before the last one had, by its stamp, when the last one arrived. oldest: the most of it.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -60,7 +60,6 @@ class Nodes:
         self.commands: list[tuple[float, float]] = []
         self.said, self.others = "", None
         self._known: int | None = None
-        self.age = self.oldest = 0.0
         self._answered: int | None = None  # stamp of the last answer, ns
         rclpy.init()
         self.node = rclpy.create_node("encounters")
@@ -149,9 +148,6 @@ class Nodes:
         from collision_monitor.codec import decode_alerts
 
         array = decode_alerts(data)
-        if self._answered is not None:
-            self.age = (self.now - self._answered) * 1e-9
-            self.oldest = max(self.oldest, self.age)
         self._answered, number = array.stamp_ns, array.monitor
         if self._known is None:
             self._known = number
@@ -161,8 +157,12 @@ class Nodes:
     def forget(self) -> None:
         """Begin anew to keep commands and to watch for other monitors."""
         self.commands.clear()
-        self.others = self._known = self._answered = None
-        self.oldest = 0.0
+        self.others = self._known = None
+
+    @property
+    def age(self) -> float:
+        """Age of the last answer by its stamp (s); infinite: none arrived."""
+        return math.inf if self._answered is None else (self.now - self._answered) * 1e-9
 
     @property
     def now(self) -> int:

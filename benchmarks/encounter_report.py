@@ -29,9 +29,15 @@ def _times(values: Sequence[float | None]) -> str:
     return f"{np.median(known):.2f}, {max(known):.2f}" if known else "-"
 
 
+def shows(outcome: Any) -> bool:
+    """Return whether an encounter took place: in real time, with a robot that drove when the fault began."""
+    drove = outcome.scene == "passes" or outcome.met_at > 0.01
+    return bool(drove and outcome.lag <= LATE and np.isfinite(outcome.margin))
+
+
 def table(done: Sequence[Any]) -> list[str]:
     """Return the lines of a table in Markdown, and the figures below it."""
-    played, done = done, [each for each in done if each.lag <= LATE]
+    played, done = done, [each for each in done if shows(each)]
     lines = [
         "| Fault | encounters | to the command to stop: median, most (s) | to standstill: median, most (s) | held "
         "| nearest (m) | least of distance − braking distance (m) |",
@@ -45,8 +51,9 @@ def table(done: Sequence[Any]) -> list[str]:
             f"| {min(e.margin for e in some):.2f} |"
         )
     bad = [each for each in done if each.margin < 0.0]
-    late = len(played) - len(done)
-    lines += ["", f"{late} more encounters are left out, because their simulation was late by more than {LATE} s"]
+    late = sum(each.lag > LATE for each in played)
+    lines += ["", f"left out: {late} encounters whose simulation was late by more than {LATE} s, and"]
+    lines += [f"{len(played) - len(done) - late} in which the robot already stood, because the machine was late before"]
     lines += [f"{len(done)} encounters; nearer than the braking distance: {len(bad)}"]
     lines += [f"  {e.fault}, {e.scene}: {e.margin:.3f} m, contact at {e.contact:.2f} m/s: {e.said}" for e in bad]
     moved = [each for each in done if each.stops and each.stood is None]
@@ -78,7 +85,7 @@ def _needless(done: Sequence[Any]) -> list[str]:
 
 def draw(done: Sequence[Any], path: Path) -> None:
     """Draw the time to standstill and the least distance beyond the braking distance, one dot for each encounter."""
-    done = [each for each in done if each.lag <= LATE]
+    done = [each for each in done if shows(each)]
     from matplotlib.figure import Figure
 
     rows = list(_by_fault(done).items())[::-1]

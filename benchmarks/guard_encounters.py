@@ -220,7 +220,7 @@ class Encounter:
         outcome, begun = self.outcome, self._now
         while self._now - begun < GIVE_UP:
             self._step(outcome.speed)
-            outcome.oldest = self._nodes.oldest
+            outcome.oldest = max(outcome.oldest, self._nodes.age)
             passed = [speed for _, speed in self._nodes.commands]
             first = next((k for k, speed in enumerate(passed) if speed > 0.0), None)
             if first is not None and (outcome.scene != "walks" or self._world.gap > 1.5):
