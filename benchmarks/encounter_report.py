@@ -45,9 +45,10 @@ def table(done: Sequence[Any]) -> list[str]:
     ]
     for fault, some in _by_fault(done).items():
         stood = [each for each in some if each.stood is not None]
+        held = f"{sum(not e.broke for e in stood)} of {len(some)}" if some[0].stops else "-"
         lines.append(
             f"| {fault} | {len(some)} | {_times([e.commanded for e in some])} | {_times([e.stood for e in some])} "
-            f"| {sum(not e.broke for e in stood)} of {len(some)} | {min(e.nearest for e in some):.2f} "
+            f"| {held} | {min(e.nearest for e in some):.2f} "
             f"| {min(e.margin for e in some):.2f} |"
         )
     bad = [each for each in done if each.margin < 0.0]
@@ -65,8 +66,11 @@ def table(done: Sequence[Any]) -> list[str]:
 
 
 def _needless(done: Sequence[Any]) -> list[str]:
-    """Return the figures of stops before a fault, or without one. Late answers are a fault of the machine itself."""
-    lines = []
+    """Return the figures of stops before a fault, or without one. Late answers are a fault of the machine itself.
+
+    Before a crate that walks at the robot a stop is not needless.
+    """
+    lines, done = [], [each for each in done if each.scene != "walks"]
     for words, some in (
         ("the answers never older than 0.25 s", [each for each in done if each.oldest <= FRESH]),
         ("answers older than that, because the machine was busy", [each for each in done if each.oldest > FRESH]),
@@ -101,10 +105,10 @@ def draw(done: Sequence[Any], path: Path) -> None:
         margins = [e.margin if np.isfinite(e.margin) else np.nan for e in some]
         right.scatter(margins, k + jitter, s=9, color="#2e9e5b")
     left.set_yticks(range(len(rows)), [f"{fault} ({len(some)})" for fault, some in rows])
-    left.set_xlabel("s after the fault; after the crate appears in the last two rows")
-    left.legend(frameon=False, fontsize=9, loc="upper right")
+    left.set_xlabel("s after the fault\n(last two rows: after a crate appears ahead)")
+    left.legend(frameon=False, fontsize=9, loc="lower right")
     right.axvline(0.0, color="#c0302b", linewidth=1.0, linestyle="--")
-    right.set_xlabel("least distance to the crate beyond the braking distance, m")
+    right.set_xlabel("least of distance to the crate\nless braking distance, m")
     left.set_xlim(0.0)
     right.set_xlim(min(0.0, right.get_xlim()[0]) - 0.05)
     for axes in (left, right):

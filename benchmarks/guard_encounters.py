@@ -223,7 +223,7 @@ class Encounter:
             outcome.oldest = max(outcome.oldest, self._nodes.age)
             passed = [speed for _, speed in self._nodes.commands]
             first = next((k for k, speed in enumerate(passed) if speed > 0.0), None)
-            if first is not None and (outcome.scene != "walks" or self._world.gap > 1.5):
+            if first is not None and outcome.scene != "walks":  # before a crate that comes a stop is not needless
                 stops = sum(speed == 0.0 for speed in passed[first:])
                 if stops > outcome.needless:
                     outcome.needless, outcome.why_needless = stops, outcome.why_needless or self._nodes.said
