@@ -106,7 +106,7 @@ def draw(done: Sequence[Any], path: Path) -> None:
         right.scatter(margins, k + jitter, s=9, color="#2e9e5b")
     left.set_yticks(range(len(rows)), [f"{fault} ({len(some)})" for fault, some in rows])
     left.set_xlabel("s after the fault\n(last two rows: after a crate appears ahead)")
-    left.legend(frameon=False, fontsize=9, loc="lower right")
+    left.legend(frameon=False, fontsize=9, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     right.axvline(0.0, color="#c0302b", linewidth=1.0, linestyle="--")
     right.set_xlabel("least of distance to the crate\nless braking distance, m")
     left.set_xlim(0.0)
