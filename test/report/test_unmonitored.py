@@ -44,7 +44,9 @@ def session(tmp_path: Path) -> Path:
     (tmp_path / "arm.urdf").write_text(URDF)
     arm = {"urdf": str(tmp_path / "arm.urdf"), "base": {"pose": [0, 20, 0]}}
     import_bag(
-        write_bag(tmp_path / "bag", scene(2.5)), tmp_path / "run.mcap", make_mapping({**MAPPING, "robots": {"arm": arm}})
+        write_bag(tmp_path / "bag", scene(2.5)),
+        tmp_path / "run.mcap",
+        make_mapping({**MAPPING, "robots": {"arm": arm}}),
     )
     return tmp_path / "run.mcap"
 
