@@ -41,7 +41,7 @@ def _in_force(rule: Rule, array: CollisionAlertArray, name_of: Callable[[int], s
             against = "every other object" if side.against == ANY else side.against
             covered.append(f"{_named(side.ids.tolist(), name_of)} against {against}")
     missing = [each for each in array.unmonitored if set(each.coverage) & set(own)]
-    texts = [f"{each.name or 'others'}: {each.reason}" for each in missing]
+    texts = [f"{each.name}: {each.reason}" if each.is_silent else each.reason for each in missing]
     unfit = array.coverage[own[0]].unfit if own else ""
     values = {
         **rule_values(rule),

@@ -83,8 +83,8 @@ def _check(path: Path, seconds: float) -> int:
     with ros_context(["collision-monitor"]):
         from collision_monitor.ros.listening.survey import check
 
-        lines = check(mapping, seconds)
-    good = True
+        lines, missing = check(mapping, seconds)
+    good = not missing
     for line in lines:
         is_implied = line.name == line.topic
         good = good and (is_implied or line.text == "ok")
@@ -93,6 +93,8 @@ def _check(path: Path, seconds: float) -> int:
         print(f"{head:>8}  {line.name}: {line.topic} {line.type or '(no publisher)'}")
         text = line.text.removeprefix(f"{line.name}: ")
         print(f"          {line.messages} messages, {line.states} states, {line.refused} refused: {text}")
+    for text in missing:
+        print(f"not monitored: {text}")
     return ExitCode.DONE if good else ExitCode.NOT_AS_EXPECTED
 
 

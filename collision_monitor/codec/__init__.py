@@ -22,6 +22,12 @@ from collision_monitor.codec.descriptions import (
     decode_descriptions,
     encode_descriptions,
 )
+from collision_monitor.codec.diagnostics import (
+    DiagnosticArray,
+    DiagnosticStatus,
+    decode_diagnostics,
+    encode_diagnostics,
+)
 from collision_monitor.codec.parameter_event import ParameterEvent, decode_parameter_event, encode_parameter_event
 from collision_monitor.codec.predictions import PredictedCollisionArray, decode_predictions, encode_predictions
 from collision_monitor.codec.states import ObjectStateArray, decode_states, encode_states
@@ -34,6 +40,8 @@ __all__ = [
     "CollisionAlert",
     "CollisionAlertArray",
     "ContactArray",
+    "DiagnosticArray",
+    "DiagnosticStatus",
     "MonitorStatus",
     "ObjectDescriptionArray",
     "ObjectStateArray",
@@ -46,6 +54,7 @@ __all__ = [
     "decode_alerts",
     "decode_contacts",
     "decode_descriptions",
+    "decode_diagnostics",
     "decode_parameter_event",
     "decode_predictions",
     "decode_states",
@@ -54,6 +63,7 @@ __all__ = [
     "encode_alerts",
     "encode_contacts",
     "encode_descriptions",
+    "encode_diagnostics",
     "encode_parameter_event",
     "encode_predictions",
     "encode_states",

@@ -10,9 +10,6 @@ from collision_monitor.settings.parameter_file import NODE as NODE
 STATUS_PERIOD: Final = 50_000_000
 """ns between two statuses while steps arrive: 20 Hz is enough for people and supervisors, and 1 kHz too much."""
 
-SOURCES: Final = "~/sources"
-"""Topic of a DiagnosticArray about the other programs' topics that the node reads, about once a second."""
-
 RULES: Final = "~/rules"
 """Topic of a String with the rules of the alerts (YAML), from a latched publisher."""
 
@@ -67,6 +64,10 @@ class Topic(Enum):
     MONITORED_STATES = "monitored/states", _OBJECT_STATES, Quality(10, "best_effort")
     """What the node takes from its own topics and its sources, for viewers. Not recorded, because the inputs are."""
 
+    SOURCES = "sources", "diagnostic_msgs/msg/DiagnosticArray", Quality(1)
+    """About the other programs' topics that the node reads, about once a second. Recorded is what is not monitored, at
+    each change."""
+
     MARKERS = "markers", "visualization_msgs/msg/MarkerArray", Quality(1)
     """A picture for people, who need only the newest."""
 
@@ -92,5 +93,6 @@ class Topic(Enum):
 
 RECORDED: Final = (
     *(Topic.SHAPES, Topic.STATES, Topic.SETTINGS, Topic.CONTACTS, Topic.PREDICTIONS, Topic.STATUS, Topic.ALERTS),
+    Topic.SOURCES,
 )
 """The topics that the node records, in the order of a session's channels."""

@@ -98,6 +98,8 @@ def _doubts(history: History, facts: ReportFacts) -> list[str]:
     unseen = [each.name for i, each in sorted(history.objects.items()) if not each.static and i not in seen]
     if unseen:
         lines.append(f"no state of {_names(unseen)} was ever received")
+    lasting = [each.text for each in history.unmonitored if each.is_lasting]
+    lines += _some([f"not monitored: {text}" for text in lasting], "things that were not monitored")
     if history.restarts:
         often = counted(history.restarts, "time")
         lines.append(f"the clock was set back ({often}): times on this page continue as if it had stood still")

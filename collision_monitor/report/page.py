@@ -131,7 +131,7 @@ def page(history: History, facts: ReportFacts, pictures: dict[str, str]) -> str:
     said = captions(history, facts)
     drawn = [_section(title, said[name], pictures.get(name)) for name, title in PICTURES.items()]
     alerts = drawn[1] + alert_table(history) if drawn[1] else _without_alerts(history)
-    above = [_verdict(history, facts), drawn[0], alerts, _collisions(history, facts)]
+    above = [_verdict(history, facts), _unmonitored(history), drawn[0], alerts, _collisions(history, facts)]
     sections = [*above, *drawn[2:], _provenance(history)]
     title = escape(history.name)
     return (
@@ -222,6 +222,28 @@ def _collisions(history: History, facts: ReportFacts) -> str:
         'began. First stated: the time of contact by the first prediction.</p>\n<div class="scroll"><table>\n'
         "<tr><th>pair</th>"
         f"{heads}</tr>\n" + "\n".join(rows) + f"\n</table></div>{out}"
+    )
+
+
+def _unmonitored(history: History) -> str:
+    """Return the table of what the sources file asked for and was not monitored."""
+    lasting = [each for each in history.unmonitored if each.is_lasting]
+    if not lasting:
+        return ""
+    rows = []
+    for each in lasting[:ROWS]:
+        begin = "start" if each.begin <= 0.0 else f"{each.begin:.1f}"
+        end = "end" if each.end is None else f"{each.end:.1f}"
+        times = f'<td class="number">{begin}</td><td class="number">{end}</td>'
+        rows.append(f"<tr><td><bdi>{escape(each.text)}</bdi></td>{times}</tr>")
+    left = len(lasting) - ROWS
+    out = f"<p>The first {ROWS}; {left} more left out.</p>" if left > 0 else ""
+    return (
+        "<h2>Not monitored</h2>\n<p>What the sources file asks for and was not there, so that no answer covers it. "
+        'Times count from the first step.</p>\n<div class="scroll"><table>\n'
+        '<tr><th>what</th><th class="number">from<br>(s)</th><th class="number">to<br>(s)</th></tr>\n'
+        + "\n".join(rows)
+        + f"\n</table></div>{out}"
     )
 
 

@@ -11,12 +11,24 @@ from collision_monitor.sources.decoding import Decoder
 from collision_monitor.sources.feed import Feed, Input
 from collision_monitor.sources.ground.mapping import Mapping, load_mapping
 from collision_monitor.sources.ground.source import RawMessage
-from collision_monitor.sources.ground.unmonitored import Unmonitored
+from collision_monitor.sources.ground.unmonitored import Unmonitored, UnmonitoredRecord, as_status
 
 if TYPE_CHECKING:
     from collision_monitor.sources.importing import Imported, import_bag
 
-__all__ = ["Decoder", "Feed", "Imported", "Input", "Mapping", "RawMessage", "Unmonitored", "import_bag", "load_mapping"]
+__all__ = [
+    "Decoder",
+    "Feed",
+    "Imported",
+    "Input",
+    "Mapping",
+    "RawMessage",
+    "Unmonitored",
+    "UnmonitoredRecord",
+    "as_status",
+    "import_bag",
+    "load_mapping",
+]
 
 
 def __getattr__(name: str) -> Any:

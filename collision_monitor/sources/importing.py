@@ -23,7 +23,7 @@ from collision_monitor.sources.decoding import Decoder
 from collision_monitor.sources.failures import FailureFiles
 from collision_monitor.sources.feed import STATIC, Feed, Input
 from collision_monitor.sources.ground.mapping import Mapping
-from collision_monitor.sources.ground.unmonitored import Unmonitored
+from collision_monitor.sources.ground.unmonitored import Unmonitored, UnmonitoredRecord
 from collision_monitor.sources.kinds import BY_TYPE
 from collision_monitor.sources.messages.tf_objects import TRANSFORMS
 
@@ -76,7 +76,7 @@ def import_bag(
     Without a mapping the bag must hold a monitor's inputs; node: the monitor to use, if there are several. rules: for
     the alerts. Raises SessionError or InputError; then there is no target.
     """
-    result = Imported()
+    result, feed = Imported(), None
     check_recording(target, overwrite=overwrite, inputs=[source])
     with Bag(source) as bag:
         if mapping is None:
@@ -85,8 +85,8 @@ def import_bag(
             feed = _feed_of(bag, mapping)
             frame_id, inputs = mapping.frame, _mapped_inputs(bag, feed)
         pipeline = Pipeline(profile, frame_id=frame_id, timed=False, rules=rules)
-        _write(inputs, target, pipeline, result, overwrite, progress)
-    if mapping is not None:
+        _write(inputs, feed, target, pipeline, result, overwrite, progress)
+    if feed is not None:
         result.states, result.skipped = dict(feed.scene.states), dict(feed.scene.refused)
         result.unmonitored = list(feed.unmonitored)
         files = FailureFiles(target.with_name(f"{target.stem}_failures"))
@@ -97,6 +97,7 @@ def import_bag(
 
 def _write(
     inputs: Iterator[Input],
+    feed: Feed | None,
     target: Path,
     pipeline: Pipeline,
     result: Imported,
@@ -107,11 +108,13 @@ def _write(
     first = next(inputs, None)  # read first, so that an unusable bag leaves no file
     if first is None:
         raise SessionError("expected messages of the mapped topics in the bag, got none")
-    left_out = {Topic.SETTINGS} if pipeline.rules.text else {Topic.SETTINGS, Topic.ALERTS}
+    left_out = {Topic.SETTINGS}
+    left_out |= set() if pipeline.rules.text else {Topic.ALERTS}
+    left_out |= set() if feed is not None else {Topic.SOURCES}
     types = {topic.of(): topic.message for topic in RECORDED if topic not in left_out}
     recorder = Recorder(target, types, pipeline.metadata(node=f"/{NODE}"), overwrite=overwrite, patient=True)
     try:
-        _feed(first, inputs, pipeline, recorder, result, progress)
+        _feed(first, inputs, feed, pipeline, recorder, result, progress)
     except BaseException:
         recorder.close()
         _remove(target)
@@ -128,6 +131,7 @@ def _write(
 def _feed(
     first: Input,
     others: Iterator[Input],
+    feed: Feed | None,
     pipeline: Pipeline,
     recorder: Recorder,
     result: Imported,
@@ -138,10 +142,13 @@ def _feed(
     def record(topic: Topic, data: bytes, publish_time: int) -> None:
         recorder.write(topic.of(), data, now, publish_time)
 
+    missing = UnmonitoredRecord(NODE)
     last_status = now = first.log_time
     record(Topic.STATUS, pipeline.status(), now)
     for each in chain([first], others):
         now = each.log_time
+        if feed is not None and (data := missing.changed(feed.unmonitored, now)) is not None:
+            record(Topic.SOURCES, data, now)
         outputs = None
         if each.topic is Topic.STATES:
             outputs = pipeline.on_states(each.data)
@@ -162,6 +169,8 @@ def _feed(
                 record(Topic.STATUS, pipeline.status(), now)
         if progress is not None:
             progress(result)
+    if feed is not None and (data := missing.changed(feed.unmonitored, now)) is not None:
+        record(Topic.SOURCES, data, now)
     record(Topic.STATUS, pipeline.status(), now)
 
 

@@ -9,6 +9,7 @@ import pytest
 
 pytest.importorskip("rclpy")
 msg = pytest.importorskip("collision_monitor_msgs.msg")
+from diagnostic_msgs.msg import DiagnosticArray  # noqa: E402
 from geometry_msgs.msg import Point, Pose  # noqa: E402
 from rclpy.serialization import deserialize_message, serialize_message  # noqa: E402
 
@@ -25,6 +26,8 @@ def random_value(kind: str, generator: np.random.Generator) -> Any:
         return bool(generator.integers(2))
     if kind in ("double", "float64"):
         return float(generator.normal() * 10.0 ** generator.integers(-3, 4))
+    if kind == "octet":
+        return bytes([int(generator.integers(256))])
     if kind == "string":
         return TEXTS[generator.integers(len(TEXTS))]
     if kind.startswith(("uint", "int")):
@@ -221,3 +224,20 @@ def test_the_record_layouts_are_those_of_the_messages() -> None:
         (msg.PredictedCollision, records.PREDICTION),
     ]:
         assert len(serialize_message(kind())) == 4 + dtype.itemsize
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_diagnostics(seed: int) -> None:
+    message = random_message(DiagnosticArray, np.random.default_rng(seed))
+    message.header.frame_id = ""
+    for status in message.status:
+        for k, value in enumerate(status.values):
+            value.key += str(k)
+    it = codec.decode_diagnostics(serialize_message(message))
+    assert it.stamp_ns == stamp(message)
+    for ours, theirs in zip(it.statuses, message.status, strict=True):
+        assert (bytes([ours.level]), ours.name) == (theirs.level, theirs.name)
+        assert (ours.message, ours.hardware_id) == (theirs.message, theirs.hardware_id)
+        assert ours.values == {each.key: each.value for each in theirs.values}
+    again = codec.encode_diagnostics(it.stamp_ns, it.statuses)
+    assert deserialize_message(again, DiagnosticArray) == message

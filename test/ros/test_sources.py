@@ -191,6 +191,18 @@ def level_of(report: Any, name: str) -> tuple[bytes, str]:
     return status.level, status.message
 
 
+def test_a_check_lists_what_would_not_be_monitored(start: Callable[..., Any], tmp_path: Path) -> None:
+    (tmp_path / "sources.yaml").write_text(
+        "frame: map\nrate: 20\nobjects:\n"
+        "  cart: {topic: /odm, shape: {sphere: 1}}\n"
+        "  shelf: {static: true, frame: hall, shape: {sphere: 1}}\n"
+    )
+    check = start("sources", "--check", "sources.yaml", "--seconds", "3")
+    assert check.wait() == 3
+    assert "not monitored: sources.yaml, line 4: cart: /odm has no publisher\n" in check.words
+    assert "not monitored: sources.yaml, line 5: shelf: expected static transforms from 'map' to 'hall'" in check.words
+
+
 def test_the_graph_is_listed_and_the_file_to_start_from_works(
     start: Callable[..., Any], team: Any, tmp_path: Path
 ) -> None:

@@ -30,7 +30,9 @@ NUMBERS: Final = (
     ),
     NumberParameter("clock_tolerance", _LIMITS.ahead, 0.0, 1e3, "s", "Largest time by which a stamp may be ahead."),
     NumberParameter("deceleration", _BRAKING.deceleration, 1e-3, 1e3, "m/s^2", "Deceleration of a stop."),
-    NumberParameter("reaction_time", _BRAKING.reaction, 0.0, 100.0, "s", "Time from a measurement to the brakes."),
+    NumberParameter(
+        "reaction_time", _BRAKING.reaction, 0.0, 100.0, "s", "From a measurement to the brakes; max_age counts if more."
+    ),
     NumberParameter("clearance", _BRAKING.clearance, 0.0, 100.0, "m", "Distance that stays free at a stop."),
     NumberParameter("caution_factor", _BRAKING.caution, 0.0, 1.0, "", "Factor on commands at caution."),
     NumberParameter("warning_factor", _BRAKING.warning, 0.0, 1.0, "", "Factor on commands at warning."),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rcl_interfaces.msg import ParameterDescriptor
@@ -51,7 +51,9 @@ def read_guard_parameters(node: Node) -> GuardParameters:
                 f"parameter {each.name}: expected {each.least:g} to {each.most:g}, got {values[each.name]:g}"
             )
     limits = GuardLimits(*(values[each.name] for each in NUMBERS[:4]))
-    return GuardParameters(patterns, base, monitor, stamped, limits, Braking(*(values[e.name] for e in NUMBERS[4:])))
+    braking = Braking(*(values[each.name] for each in NUMBERS[4:]))
+    braking = replace(braking, reaction=max(braking.reaction, limits.max_age))  # for so long it relies on one answer
+    return GuardParameters(patterns, base, monitor, stamped, limits, braking)
 
 
 def _names(given: Any) -> tuple[str, ...]:

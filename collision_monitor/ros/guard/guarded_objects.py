@@ -84,4 +84,3 @@ def _pose(row: np.void) -> PartPose | None:
     # an unknown velocity counts as none: then all of a closing speed is the obstacle's
     linear, angular = (v if all(map(math.isfinite, v)) else (0.0, 0.0, 0.0) for v in (linear, angular))
     return PartPose(position, heading, linear, angular)
-

@@ -113,14 +113,14 @@ def _noting(facts: TopicFacts, decoder: Decoder) -> Callable[[bytes], None]:
     return note
 
 
-def check(mapping: Mapping, seconds: float) -> list[LineReport]:
-    """Run the sources of a file without a monitor, and return what each of its lines did."""
+def check(mapping: Mapping, seconds: float) -> tuple[list[LineReport], list[str]]:
+    """Run the sources of a file without a monitor. Return what each of its lines did, and what is not monitored."""
     with _Listener("collision_monitor_check") as listener:
         sources = LiveSources(listener.node, mapping, lambda given: None, lambda name, text, count: None)
         sources.begin()
         listener.listen(seconds)
         sources.close()
-        return sources.lines()
+        return sources.lines(), [mapping.located(row.text) for row in sources.unmonitored]
 
 
 class _Listener:

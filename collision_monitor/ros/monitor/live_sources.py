@@ -17,8 +17,8 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from collision_monitor.errors import CollisionMonitorError, InputError, MessageError
-from collision_monitor.pipeline.topics import SOURCES
-from collision_monitor.ros.endpoints import message_class
+from collision_monitor.pipeline.topics import Topic
+from collision_monitor.ros.endpoints import message_class, publisher
 from collision_monitor.ros.health.line_report import DiagnosticLevel, LineReport
 from collision_monitor.ros.health.unmonitored_report import unmonitored_statuses
 from collision_monitor.ros.monitor.large_messages import LargeMessages
@@ -78,7 +78,7 @@ class LiveSources:
         self._problems: dict[str, str] = {}  # the same, or the name of a line -> why it cannot be used
         self._messages: dict[str, int] = {}
         self._logged: dict[str, float] = {}  # when each row of what is not monitored was last logged, s
-        self._out = node.create_publisher(DiagnosticArray, SOURCES, QoSProfile(depth=1))
+        self._out = publisher(node, Topic.SOURCES)
         node.create_timer(SEARCH_PERIOD, self._search)
         node.create_timer(REPORT_PERIOD, self._report)
         node.create_timer(GO_ON_PERIOD, self._go_on)

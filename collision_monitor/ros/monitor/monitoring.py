@@ -43,7 +43,7 @@ from collision_monitor.warm_up import warm_up_alerts
 
 if TYPE_CHECKING:
     from collision_monitor.ros.monitor.live_sources import LiveSources
-    from collision_monitor.sources import Input, Mapping, Unmonitored
+    from collision_monitor.sources import Input, Mapping, Unmonitored, UnmonitoredRecord
 
 WATCHDOG_PERIOD: Final = 0.5
 """s: without steps the status is still published at least this often, so that silence never means "clear"."""
@@ -105,6 +105,7 @@ class Monitoring:
         readable = self._contacts_out, self._markers_out
         self._readers = ContactReaders(readable, self._recording, self._pipeline)
         self._keeping_up = KeepingUp(states, self._times, self._refusals, profile, enabled=settings.keep_up)
+        self._unmonitored_record: UnmonitoredRecord | None = None
         self._sources = self._live_sources(settings.sources)
         self._alerts = AlertOutputs(node, self._pipeline, self._unmonitored)
         if self._sources is not None:
@@ -113,6 +114,7 @@ class Monitoring:
         gc.unfreeze()  # what an earlier configuration kept
         _keep_from_collector()
         resources.callback(self._publish_status)  # the last one of the recording
+        resources.callback(self._record_unmonitored)
         resources.callback(lambda: self._logger.info(str(self._times)))
         if self._sources is not None:
             self._sources.begin()
@@ -146,6 +148,9 @@ class Monitoring:
         if mapping is None:
             return None
         from collision_monitor.ros.monitor.live_sources import LiveSources
+        from collision_monitor.sources import UnmonitoredRecord
+
+        self._unmonitored_record = UnmonitoredRecord(self._name.strip("/"))
 
         def take(given: Input) -> None:
             if given.topic is Topic.STATES:
@@ -161,6 +166,14 @@ class Monitoring:
     def _unmonitored(self) -> tuple[Unmonitored, ...]:
         """Return what the sources file asks for and is not monitored."""
         return () if self._sources is None else self._sources.unmonitored
+
+    def _record_unmonitored(self) -> None:
+        """Record what is not monitored, if that has changed."""
+        if self._unmonitored_record is None or not self._recording.is_on:
+            return
+        now = self._now()
+        if (data := self._unmonitored_record.changed(self._unmonitored(), now)) is not None:
+            self._recording.write(Topic.SOURCES, data, now, now)
 
     # -- states: one step
 
@@ -299,6 +312,7 @@ class Monitoring:
         if (profile := self._keeping_up.look(now)) is not None:
             self._use(profile)
         self._publish_status_if_due(now)
+        self._record_unmonitored()
         self._alerts.publish()
         if now - self._last_log >= LOG_PERIOD and not silent and self._last_step is not None:
             self._last_log = now

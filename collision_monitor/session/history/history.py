@@ -28,6 +28,9 @@ Pair = tuple[int, int]
 STEPS_MISSING: Final = 5.0
 """Number of median periods without a step that make a gap, if that is longer than the profile's stale_after."""
 
+START: Final = 1.0
+"""s in which the first messages of all topics may come after the start of a session."""
+
 ANY: Final = "any"
 """Selects every pair, in place of names."""
 
@@ -52,6 +55,23 @@ class CollisionEvent:
     warned: float
 
 
+@dataclass(frozen=True)
+class UnmonitoredSpan:
+    """What the sources file asked for and was not monitored, from `begin` to `end` (s from the first step).
+
+    begin: negative if it began before the first step. end: None if it lasts to the end. text: for people.
+    """
+
+    text: str
+    begin: float
+    end: float | None
+
+    @property
+    def is_lasting(self) -> bool:
+        """Whether it was longer than what every start takes."""
+        return self.end is None or self.end - self.begin > START
+
+
 @dataclass
 class History:
     """A session, from its first step to its last.
@@ -61,7 +81,8 @@ class History:
     and records.PREDICTION, with the step (index) of each row. states: of all messages, records.STATE, with the time
     (s). objects: by id, as described last; names: all names that occurred, with their ids. profile: at the start;
     settings: the changed ones, with the time (s) of the first step that used them. alerts: the changes of alerts, with
-    their times (s); rules: those at the start, or those that replace them. durations: step times (s), as far as
+    their times (s); rules: those at the start, or those that replace them. unmonitored: what was asked for and not
+    there, by begin. durations: step times (s), as far as
     they were reported or measured. status: the last one, or the replay's. problems: why some of it may be unknown.
     """
 
@@ -84,6 +105,7 @@ class History:
     settings: list[tuple[float, dict[str, Any]]] = field(default_factory=list)
     alerts: list[tuple[float, CollisionAlert]] = field(default_factory=list)
     rules: Rules = field(default_factory=Rules)
+    unmonitored: list[UnmonitoredSpan] = field(default_factory=list)
     status: MonitorStatus | None = None
     problems: list[str] = field(default_factory=list)
     collisions: list[CollisionEvent] = field(default_factory=list)

@@ -18,6 +18,7 @@ from collision_monitor.codec import (
     decode_alert,
     decode_contacts,
     decode_descriptions,
+    decode_diagnostics,
     decode_parameter_event,
     decode_predictions,
     decode_states,
@@ -27,9 +28,11 @@ from collision_monitor.errors import MessageError, SessionError
 from collision_monitor.monitor.state.timeline import NANOSECOND
 from collision_monitor.pipeline.pipeline import Outputs, Pipeline
 from collision_monitor.pipeline.settings_event import LIMIT, NOW, RULES
+from collision_monitor.pipeline.topics import Topic
 from collision_monitor.session.history.collisions import find_collisions
 from collision_monitor.session.history.growing_rows import GrowingRows
 from collision_monitor.session.history.history import History, Records
+from collision_monitor.session.history.unmonitored_rows import UnmonitoredRows
 from collision_monitor.session.mcap.layout import SEQUENCE_MASK
 from collision_monitor.session.mcap.rosbag2 import INPUT_TYPES
 from collision_monitor.session.reader import Recorded, Session
@@ -84,6 +87,7 @@ class _Gathered:
         self._next_step: list[int] = []  # index of the step after each message of states
         self._durations: list[float] = []
         self._alerts: list[tuple[int, CollisionAlert]] = []  # index of the step
+        self._unmonitored = UnmonitoredRows()
 
     def take(self, message: Recorded) -> None:
         missing = (message.sequence - self._count) & SEQUENCE_MASK
@@ -133,6 +137,8 @@ class _Gathered:
                 self._predictions.append(step, predictions.predictions)
             case "CollisionAlert" if answers:
                 self._take_alert(decode_alert(message.data))
+            case "DiagnosticArray" if message.topic.endswith(f"/{Topic.SOURCES.path}"):
+                self._unmonitored.take(decode_diagnostics(message.data))
             case "MonitorStatus":
                 status = self._history.status = decode_status(message.data)
                 if answers and np.isfinite(status.step_duration):
@@ -178,6 +184,7 @@ class _Gathered:
         h.state_time = np.asarray((stamps_of - h.begin_ns) * NANOSECOND, np.float64)
         h.durations = np.array(self._durations)
         h.alerts = [(float(h.times[step]), alert) for step, alert in self._alerts]
+        h.unmonitored = self._unmonitored.spans(h.begin_ns)
         h.settings = [(float(h.times[k]), changed) for k, changed in self._settings if k < len(stamps)]
         if self._pipeline is not None:
             h.status = self._status_of_replay(self._pipeline)

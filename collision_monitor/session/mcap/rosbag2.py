@@ -17,8 +17,10 @@ _METADATA_VERSION: Final = 9
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 _TOPICS: Final = (
     *(Topic.STATES, Topic.SHAPES, Topic.CONTACTS, Topic.PREDICTIONS, Topic.STATUS, Topic.SETTINGS, Topic.ALERTS),
+    Topic.SOURCES,
 )
 _QOS: Final = {topic.message: topic.quality for topic in _TOPICS}
+_FULL_NAMES: Final = {topic.message: topic.type_name for topic in _TOPICS}
 RECORDED_TYPES: Final = tuple(_QOS)
 """The message types that a session holds."""
 
@@ -28,7 +30,7 @@ INPUT_TYPES: Final = (Topic.STATES.message, Topic.SHAPES.message)
 
 def full_name(name: str) -> str:
     """Return the full name: `ContactArray` -> `collision_monitor_msgs/msg/ContactArray`."""
-    return f"{'rcl_interfaces' if name == 'ParameterEvent' else 'collision_monitor_msgs'}/msg/{name}"
+    return _FULL_NAMES.get(name, f"collision_monitor_msgs/msg/{name}")
 
 
 def qos_profiles(name: str) -> list[dict[str, Any]]:

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Final, NamedTuple
+
+from collision_monitor.codec import DiagnosticStatus, encode_diagnostics
+from collision_monitor.codec.diagnostics import SINCE
 
 MOST_ROWS: Final = 1000
 """Rows of the list. A line with many links or objects may fill it; then the last row says so."""
 
 LONGEST_REASON: Final = 500
 """Characters of a reason, which may quote a message."""
+
+_ERROR: Final = 2
+"""Level of diagnostic_msgs/DiagnosticStatus."""
 
 
 class Unmonitored(NamedTuple):
@@ -31,6 +38,29 @@ class Unmonitored(NamedTuple):
             return self.reason
         what = "" if self.what == self.line or self.what in self.reason else f"{self.what}: "
         return f"{self.line}: {what}{self.reason}"
+
+
+def as_status(node: str, row: Unmonitored) -> DiagnosticStatus:
+    """Return an ERROR for a row, with its line, its reason and since when (ns)."""
+    name = f"{node}: not monitored: {row.what or row.line or 'others'}"
+    values = {"line": row.line, "what": row.what, "reason": row.reason, SINCE: str(row.since_ns)}
+    return DiagnosticStatus(_ERROR, name, row.text, values)
+
+
+class UnmonitoredRecord:
+    """Encodes the list for a recording, whenever it differs from the one before. node: its name."""
+
+    def __init__(self, node: str) -> None:
+        self._node = node
+        self._last: tuple[Unmonitored, ...] = ()
+
+    def changed(self, rows: Iterable[Unmonitored], now_ns: int) -> bytes | None:
+        """Return a DiagnosticArray with an ERROR for each row, stamped now; None: they are as at the last call."""
+        found = tuple(rows)
+        if found == self._last:
+            return None
+        self._last = found
+        return encode_diagnostics(now_ns, [as_status(self._node, row) for row in found])
 
 
 class UnmonitoredList:
