@@ -1,7 +1,7 @@
 """Simulated hours of other programs before the sources: `make soak ARGS=--sources`, see soak.py.
 
 A robot drives in a moving frame of tf, tracks and detections come, fall silent and go, markers appear and are deleted, a
-scanner loses beams. Between them come hostile messages of all types on topics of their own. Each simulated half hour
+scanner loses beams. Between them come hostile messages of all types on topics of their own. Each five simulated minutes
 time goes back to the start, like a bag in a loop. In the steps between each object that reports has to be where it is, each
 step has to be taken by the monitor, and what is gone has to be gone; no source may fail, and the memory stays flat.
 """
@@ -30,7 +30,7 @@ from collision_monitor.sources.ground.mapping import make_mapping  # noqa: E402
 PERIOD: Final = 200_000_000
 """ns between two steps."""
 
-LOOP: Final = 1800 * 1_000_000_000 // PERIOD
+LOOP: Final = 300 * 1_000_000_000 // PERIOD
 """Steps after which time goes back."""
 
 SETTLING: Final = 8
