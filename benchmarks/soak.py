@@ -350,7 +350,8 @@ def run_sources(args: argparse.Namespace) -> dict[str, Any]:
             break
     if memory and (growth := memory[-1][1] - memory[0][1]) > GROWTH / 1e6:
         soak.problems.append(f"the memory grew by {growth:.1f} MB in {args.hours} simulated hours")
-    counts = {name: getattr(soak, name) for name in ("steps", "compared", "states", "attacks", "loops", "came", "went", "refused")}
+    names = ("steps", "compared", "states", "attacks", "loops", "came", "went", "refused")
+    counts = {name: getattr(soak, name) for name in names}
     return {**counts, "problems": soak.problems, "memory": memory, "seconds": round(time.monotonic() - began, 1)}
 
 

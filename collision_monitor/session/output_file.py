@@ -18,8 +18,8 @@ _RECORDED: Final = (".mcap", ".db3")
 def check_output(path: Path, *, overwrite: bool, inputs: Iterable[Path] = ()) -> None:
     """Raise SessionError unless the file may be written: called before the work, which can be long.
 
-    overwrite: whether it may exist; a device such as /dev/stdout always may, also where that is a pipe, but a named pipe
-    may not: nobody may ever read from it. inputs: files, and folders of recordings, that are read; they are never
+    overwrite: whether it may exist; a device such as /dev/stdout always may, also where that is a pipe, but a named
+    pipe may not: nobody may ever read from it. inputs: files, and folders of recordings, that are read; they are never
     overwritten, not through a link either.
     """
     try:

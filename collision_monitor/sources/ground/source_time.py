@@ -95,7 +95,7 @@ class Clock:
     def advance(self, stream: Hashable, stamp: int, received: int) -> Progress:
         """Take a stamp of a stream. RESTARTS: the time begins anew, at this stamp. REFUSED: a jump, to be confirmed."""
         known = self._streams.get(stream)
-        if self.has_begun and stamp == self.now_ns and (known is None or stamp >= known.stamp):  # like most of a message
+        if self.has_begun and stamp == self.now_ns and (known is None or stamp >= known.stamp):
             self._note(stream, known, stamp, received)
             return Progress.CONTINUES
         if known is not None and stamp < known.stamp and known.went_back(stamp, received):
