@@ -2,6 +2,7 @@
 
     make soak                            # 24 simulated hours
     make soak ARGS="--hours 1"
+    make soak ARGS="--sources"           # messages of other programs before the monitor, see soak_sources.py
     python benchmarks/soak.py --hours 0.02 --every 20
 
 Objects come, change their shape and go; they steer and turn; their states have noise and gaps of up to 5 s; settings
@@ -332,6 +333,28 @@ def run(args: argparse.Namespace) -> tuple[Report, float]:
     return report, time.monotonic() - began
 
 
+def run_sources(args: argparse.Namespace) -> dict[str, Any]:
+    """Run the sources for simulated hours. Return what was done, and the problems."""
+    from soak_sources import PERIOD, SourceSoak
+
+    warm_up_monitor()
+    soak, began = SourceSoak(args.objects, args.seed), time.monotonic()
+    steps, memory = round(args.hours * 3.6e12 / PERIOD), []
+    marks = {round(steps * k / 10) for k in range(1, 11)}
+    for number in range(steps):
+        soak.step(number)
+        if number + 1 in marks:
+            memory.append(((number + 1) * PERIOD / 3.6e12, resident() / 1e6))
+            print(f"{memory[-1][0]:7.2f} h   {memory[-1][1]:7.1f} MB resident", file=sys.stderr, flush=True)
+        if len(soak.problems) >= 20:
+            break
+    if memory and (growth := memory[-1][1] - memory[0][1]) > GROWTH / 1e6:
+        soak.problems.append(f"the memory grew by {growth:.1f} MB in {args.hours} simulated hours")
+    names = ("steps", "compared", "states", "attacks", "loops", "came", "went", "refused")
+    counts = {name: getattr(soak, name) for name in names}
+    return {**counts, "problems": soak.problems, "memory": memory, "seconds": round(time.monotonic() - began, 1)}
+
+
 def main() -> int:
     """Return the exit code."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -340,7 +363,12 @@ def main() -> int:
     parser.add_argument("--every", type=int, default=200, help="compare at every K-th step")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--json", action="store_true", help="print one JSON line")
+    parser.add_argument("--sources", action="store_true", help="messages of other programs before the monitor")
     args = parser.parse_args()
+    if args.sources:
+        result = run_sources(args)
+        print(json.dumps(result) if args.json else "\n".join(f"{name:10} {each}" for name, each in result.items()))
+        return FAILED if result["problems"] else 0
     report, seconds = run(args)
     if args.json:
         print(json.dumps(vars(report) | {"seconds": seconds}))

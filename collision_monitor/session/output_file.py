@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Final
 
 from collision_monitor.errors import SessionError
+from collision_monitor.settings.regular_file import PIPE, SOCKET, found_instead
 
 _RECORDED: Final = (".mcap", ".db3")
 """Endings of the files of a recording, before that of a compression. Its folder may hold results too."""
@@ -17,8 +18,9 @@ _RECORDED: Final = (".mcap", ".db3")
 def check_output(path: Path, *, overwrite: bool, inputs: Iterable[Path] = ()) -> None:
     """Raise SessionError unless the file may be written: called before the work, which can be long.
 
-    overwrite: whether it may exist; a device such as /dev/stdout always may. inputs: files, and folders of recordings,
-    that are read; they are never overwritten, not through a link either.
+    overwrite: whether it may exist; a device such as /dev/stdout always may, also where that is a pipe, but a named
+    pipe may not: nobody may ever read from it. inputs: files, and folders of recordings, that are read; they are never
+    overwritten, not through a link either.
     """
     try:
         _check(path, overwrite, inputs)
@@ -44,6 +46,8 @@ def _check(path: Path, overwrite: bool, inputs: Iterable[Path]) -> None:
         raise SessionError(f"{path}: expected a file that can be written, got no folder {folder}")
     if path.is_dir():
         raise SessionError(f"{path}: expected a file that can be written, got a folder")
+    if (found := found_instead(Path(os.path.realpath(path)))) in (PIPE, SOCKET):
+        raise SessionError(f"{path}: expected a file that can be written, got {found}")
     if path.exists():
         if any(path.samefile(file) for file in _files(inputs)):
             raise SessionError(f"{path}: expected another file than those that the command reads")

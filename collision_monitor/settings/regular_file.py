@@ -18,16 +18,18 @@ from collision_monitor.errors import CollisionMonitorError, InputError
 READABLE: Final = "a file that can be read"
 
 FOLDER: Final = "a folder"
+PIPE: Final = "a named pipe"
+SOCKET: Final = "a socket"
 NOTHING: Final = "nothing there"
-"""What `found_instead` returns for a folder, and for a path that does not exist."""
+"""What `found_instead` returns for a folder, a pipe and a socket, and for a path that does not exist."""
 
 _LFS: Final = b"version https://git-lfs.github.com/spec/"
 """How the text begins that Git leaves in place of a large file."""
 
 _KINDS: Final[tuple[tuple[Callable[[int], bool], str], ...]] = (
     (stat.S_ISDIR, FOLDER),
-    (stat.S_ISFIFO, "a named pipe"),
-    (stat.S_ISSOCK, "a socket"),
+    (stat.S_ISFIFO, PIPE),
+    (stat.S_ISSOCK, SOCKET),
     (stat.S_ISCHR, "a device"),
     (stat.S_ISBLK, "a device"),
 )

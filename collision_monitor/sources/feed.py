@@ -267,13 +267,16 @@ class Feed:
     def _take_transforms(self, raw: RawMessage, content: TransformArrays) -> Iterator[Input]:
         scene, static = self.scene, raw.topic.endswith(STATIC)
         stamps: dict[str, MessageStamp] = {}  # of the frames in this message
+        own: dict[int, MessageStamp] = {}  # most transforms of a message have the same one
         poses = checked_poses(content.poses[:MOST_TRANSFORMS])
         if (more := len(content.children) - MOST_TRANSFORMS) > 0:
             scene.refuse(raw.topic, f"expected at most {MOST_TRANSFORMS} transforms in a message, got more", more)
         for k, name in enumerate(content.children[:MOST_TRANSFORMS]):
             with scene.guard(raw.topic, name):
-                child, parent = frame_name(name), frame_name(content.parents[k])
-                stamp = self._time.message_stamp(content.stamps[k], raw.received)
+                child, parent, given = frame_name(name), frame_name(content.parents[k]), content.stamps[k]
+                stamp = own.get(given) or self._time.message_stamp(given, raw.received)
+                if stamp.is_own:
+                    own[given] = stamp
                 if not static and stamp.is_own and not self._takes_transform(child, stamp.ns, raw):
                     continue
                 reason = scene.frames.put_checked(parent, child, poses[k], stamp.ns, static=static)

@@ -53,6 +53,17 @@ DOORS: dict[str, tuple[list[str], str]] = {
     "world --path": (["world", "trajectory", "--path", "PATH"], "_ped.csv"),
 }
 
+RESULTS: dict[str, list[str]] = {
+    "report": ["report", "SESSION", "-o", "PATH"],
+    "salvage": ["salvage", "SESSION", "-o", "PATH"],
+    "import": ["import", "SESSION", "-o", "PATH"],
+    "check --junit": ["check", "SESSION", "--expect", "EXPECT", "--junit", "PATH"],
+    "replay --cut": ["replay", "SESSION", "--cut", "PATH"],
+    "tune": ["tune", "SESSION", "-o", "PATH"],
+    "tradeoff --csv": ["tradeoff", "SESSION", "--csv", "PATH"],
+    "tradeoff --png": ["tradeoff", "SESSION", "--png", "PATH"],
+}
+
 READERS = {
     "rules": (lambda path: Rules.given(str(path)), ".yaml"),
     "profile": (lambda path: Profile.named(str(path)), ".yaml"),
@@ -101,6 +112,22 @@ def test_a_command_names_what_it_found_in_place_of_a_file(
             continue  # a folder may be that of a session or a bag, and a name the prefix of several files
         assert text in error, (kind, error)
     assert not (tmp_path / "out.mcap").exists()
+
+
+@pytest.mark.parametrize("result", RESULTS)
+def test_a_result_goes_into_no_pipe_that_nobody_may_read(
+    result: str, recorded: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "expect.yaml").write_text("expect: [{replay: identical}]\n")
+    path = NO_FILES["pipe"][0](tmp_path / "out.png")
+    (tmp_path / "link.png").symlink_to(path)
+    names = {"SESSION": str(recorded), "EXPECT": str(tmp_path / "expect.yaml")}
+    for target in (path, tmp_path / "link.png"):
+        names["PATH"] = str(target)
+        arguments = [names.get(each, each) for each in RESULTS[result]]
+        with without_waiting():
+            assert main([*arguments, *(["--force"] if result != "import" else [])]) in (1, 2)
+        assert "got a named pipe" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("reader", READERS)

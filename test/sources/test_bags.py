@@ -90,6 +90,27 @@ def test_a_chunk_that_is_missing_is_an_error_with_both_numbers(tmp_path: Path) -
     assert not target.exists()
 
 
+@pytest.mark.parametrize("chunked", [True, False])
+@pytest.mark.parametrize("offset", ["kept", "none"])
+def test_the_summary_counts_wherever_the_end_says_that_it_is(tmp_path: Path, chunked: bool, offset: str) -> None:
+    """Records were cut out or put behind the end of the data, and the offsets in the file are those of before."""
+    whole = mcap(tmp_path / "bag.mcap", rows(), chunk_size=2000, use_chunking=chunked).read_bytes()
+    records = mutations.parse(whole, len(MAGIC))
+    if offset == "none":
+        records[-1].content = bytes(20)
+    (end,) = (k for k, each in enumerate(records) if each.opcode == Opcode.DATA_END)
+    path = tmp_path / "damaged.mcap"
+    for k, each in enumerate(records):
+        if each.opcode not in (Opcode.CHUNK, Opcode.MESSAGE):
+            continue
+        others = records[:k] + records[k + 1 :]
+        behind = [*others[:end], each, *others[end:]]
+        for changed in (others, behind, [*records[:k], each, *records[k:]]):
+            path.write_bytes(mutations.make_file(changed))
+            with pytest.raises(SessionError, match=r"expected 40 messages|behind the end of its data|does not define"):
+                read(path)
+
+
 @pytest.mark.parametrize("stated", [20, 41])
 def test_a_total_that_differs_is_an_error_with_both_numbers(tmp_path: Path, stated: int) -> None:
     path = mcap(tmp_path / "bag.mcap", rows())

@@ -30,7 +30,8 @@ from collision_monitor.records import StateFlag
 from collision_monitor.sources.ground.covariances import usable_blocks
 from collision_monitor.sources.ground.frames import FrameMotion
 from collision_monitor.sources.ground.scene_states import squares
-from collision_monitor.sources.messages.clouds import read_cloud_points, scan_points, thinned
+from collision_monitor.sources.messages.clouds import read_cloud_points, thinned
+from collision_monitor.sources.messages.laser_scans import read_beams
 
 STEP = 50_000_000
 SPHERE = {"sphere": 1.0}
@@ -433,9 +434,9 @@ def test_markers_expire_by_their_lifetime_and_by_forget_after() -> None:
 
 def test_points_of_scans() -> None:
     _, scan = laser_scan("laser", START, [1, np.inf, np.nan, 20, 0.01, 2], start=0.0, step=math.pi / 2)
-    found, lost = scan_points(scan)
-    np.testing.assert_allclose(found, [[1, 0, 0], [0, 2, 0]], atol=1e-6)
-    assert lost == 1
+    beams = read_beams(scan)
+    np.testing.assert_allclose(beams.points[beams.met], [[1, 0, 0], [0, 2, 0]], atol=1e-6)
+    assert beams.failed.tolist() == [False, False, True, False, True, False]
     rng = np.random.default_rng(3)
     points = rng.normal(size=(500, 3)).astype(np.float32).astype(np.float64)
     points[7] = np.nan

@@ -61,6 +61,7 @@ class McapReader:
         self.path = path
         self.damage: list[str] = []
         self.position = 0
+        self._behind_data = 0
         self._unpacker = Unpacker(0)
         self._in_force = DefinitionsInForce()
         with self._open() as file:
@@ -148,7 +149,8 @@ class McapReader:
     def summary(self) -> Iterator[tuple[int, bytes]]:
         """Yield kind and content of the schemas, channels and statistics in the summary; nothing if there is none.
 
-        Raises ValueError if the file does not end like an MCAP file, or if they are too large.
+        The summary is all that follows the end of the data, where the last reading came to it. Raises ValueError if the
+        file does not end like an MCAP file, if messages follow the end of the data, or if the summary is too large.
         """
         with self._open() as file:
             file.seek(max(0, self.size - len(MAGIC) - FOOTER.size - HEAD.size))
@@ -156,19 +158,21 @@ class McapReader:
             head = HEAD.unpack_from(end) if len(end) == HEAD.size + FOOTER.size + len(MAGIC) else (0, 0)
             if head != (Opcode.FOOTER, FOOTER.size) or not end.endswith(MAGIC):
                 raise ValueError("its end is no end of an MCAP file")
-            at = FOOTER.unpack_from(end, HEAD.size)[0] or self.size
+            at, footer = self._behind_data, self.size - len(end)
             room = _LARGEST_SUMMARY
-            while at + HEAD.size <= self.size:
+            while at + HEAD.size <= footer:
                 file.seek(at)
                 opcode, length = HEAD.unpack(file.read(HEAD.size))
-                if opcode == Opcode.FOOTER or length > self.size - at - HEAD.size:
-                    return
+                if opcode in (Opcode.MESSAGE, Opcode.CHUNK):
+                    raise ValueError("it holds messages behind the end of its data")
                 if opcode in (Opcode.STATISTICS, *_DEFINED):
                     room -= length
                     if room < 0:
                         raise ValueError(f"its summary is larger than {_LARGEST_SUMMARY} bytes")
                     yield opcode, file.read(length)
                 at += HEAD.size + length
+            if at != footer:
+                raise ValueError("its summary does not lead to its end")
 
     def _compare(self, count: int) -> None:
         """Compare the number of messages that were read with the statistics of the summary."""
@@ -178,8 +182,8 @@ class McapReader:
                     stated = Statistics.read(ReadDataStream(BytesIO(content))).message_count
                     if stated != count:
                         self._note(f"its summary states {stated} messages, there are {count}")
-        except Exception:  # the library raises many kinds of errors; a summary is not needed to read a session
-            return
+        except Exception as error:  # the library raises many kinds of errors for wrong bytes
+            self._note(f"its summary cannot be compared with what is there: {str(error) or repr(error):.100}")
 
     def _note(self, text: str) -> None:
         add_sentence(self.damage, text)
@@ -201,7 +205,7 @@ class McapReader:
                 self._note(f"its last {self.size - start} bytes, from byte {start} on, are zeros or no records")
                 return
             if opcode == Opcode.DATA_END:
-                self.position = self.size
+                self.position, self._behind_data = self.size, start + HEAD.size + length
                 return
             yield start, opcode, length
 

@@ -78,7 +78,7 @@ def salvage(source: str | Path, target: str | Path, *, unverified: bool = False,
             f"{source}: expected an MCAP file, got {found}{': name one of its files' if found == FOLDER else ''}"
         )
     if target.exists() and not (target.is_file() or target.is_dir()):  # it would be replaced by a file
-        raise SessionError(f"{target}: expected a file that can be written, got a device")
+        raise SessionError(f"{target}: expected a file that can be written, got {found_instead(target)}")
     check_output(target, overwrite=overwrite, inputs=[source])
     try:
         with open_regular(source, "an MCAP file", refused=SessionError) as file:

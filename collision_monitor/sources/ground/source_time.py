@@ -95,6 +95,9 @@ class Clock:
     def advance(self, stream: Hashable, stamp: int, received: int) -> Progress:
         """Take a stamp of a stream. RESTARTS: the time begins anew, at this stamp. REFUSED: a jump, to be confirmed."""
         known = self._streams.get(stream)
+        if self.has_begun and stamp == self.now_ns and (known is None or stamp >= known.stamp):
+            self._note(stream, known, stamp, received)
+            return Progress.CONTINUES
         if known is not None and stamp < known.stamp and known.went_back(stamp, received):
             if self._back is not None and stamp > self._back:
                 self._restart(stream, stamp, received)

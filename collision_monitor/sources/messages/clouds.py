@@ -23,9 +23,10 @@ from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.ground.yaml_table import known
-from collision_monitor.sources.messages.laser_scans import SCAN, BeamMemory, read_beams, scan_points
+from collision_monitor.sources.messages.laser_scans import SCAN, BeamMemory, read_beams
+from collision_monitor.tolerances import LARGEST_INPUT
 
-__all__ = ["CLOUD", "SCAN", "CloudSource", "read_cloud_points", "scan_points", "thinned"]
+__all__ = ["CLOUD", "SCAN", "CloudSource", "read_cloud_points", "thinned"]
 
 CLOUD: Final = "sensor_msgs/msg/PointCloud2"
 
@@ -81,10 +82,9 @@ class CloudSource(Source):
 
     def _scan(self, scan: Any, frame: FrameMotion) -> tuple[Floats, int]:
         """Return the points of a LaserScan and of its failed beams, and the number of the latter. Raises InputError."""
-        beams = read_beams(scan, nan_is_free=self._entry.nan_is_free)
+        beams = read_beams(scan, nan_is_free=self._entry.nan_is_free, nearest=self._entry.min_range)
         used = beams.met & self._within(beams.points)
-        layout = len(beams.met), scan.angle_min, scan.angle_increment, scan.header.frame_id
-        held = self._memory.stays(beams, layout, frame, used)
+        held = self._memory.stays(beams, scan.header.frame_id, frame, used)
         return np.concatenate([beams.points[used], held]), int(np.count_nonzero(beams.failed))
 
     def _cloud(self, cloud: Any) -> tuple[Floats, int]:
@@ -114,7 +114,7 @@ class CloudSource(Source):
 
 
 def read_cloud_points(cloud: Any) -> tuple[Floats, int]:
-    """Return the finite points (N, 3) in m of a PointCloud2 in its frame, and the number of the others.
+    """Return the points (N, 3) in m of a PointCloud2 in its frame, and the number of those that are nowhere.
 
     Raises InputError if it has no x, y and z.
     """
@@ -126,9 +126,11 @@ def read_cloud_points(cloud: Any) -> tuple[Floats, int]:
     count = int(cloud.width) * int(cloud.height)
     if count > MOST_POINTS:
         raise InputError(f"expected at most {MOST_POINTS} points, got {count}")
+    data = np.asarray(cloud.data, np.uint8)
+    if count == 0 and len(data):
+        raise InputError(f"width, height: expected the points of {len(data)} bytes, got none")
     if count == 0:
         return np.zeros((0, 3)), 0
-    data = np.asarray(cloud.data, np.uint8)
     least = int(cloud.width) * int(cloud.point_step)
     if cloud.row_step < least or len(data) < int(cloud.height) * int(cloud.row_step):
         raise InputError(
@@ -154,7 +156,7 @@ def read_cloud_points(cloud: Any) -> tuple[Floats, int]:
     with np.errstate(invalid="ignore"):  # a signalling NaN
         for k, name in enumerate("xyz"):
             points[:, k] = raw[name]
-    finite = np.isfinite(points).all(1)
+        finite = (np.abs(points) <= LARGEST_INPUT).all(1)
     return (points, 0) if finite.all() else (points[finite], int(count - np.count_nonzero(finite)))
 
 

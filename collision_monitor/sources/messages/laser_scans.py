@@ -1,8 +1,9 @@
 """sensor_msgs/LaserScan: which beams met something, which met nothing, and which measured nothing.
 
 By REP-117, +inf means that nothing is within range, -inf that something is too near to measure, and NaN that the
-measurement failed. A number below range_min is no measurement either: many drivers write 0 for it. A beam that failed
-says nothing about what is there, so what it met last stays until it measures again.
+measurement failed. A number below range_min, or 0, is no measurement either: many drivers write 0 for it. A beam that
+failed, or that met what is too near to count, says nothing about what is behind, so what it met last stays until it
+measures again.
 """
 
 from __future__ import annotations
@@ -29,63 +30,79 @@ _LARGEST_ANGLE: Final = 8.0 * np.pi
 
 
 class Beams(NamedTuple):
-    """The N beams of a scan: points (N, 3) in its frame (m); whether something is there; whether nothing is known."""
+    """The N beams of a scan: points (N, 3) in its frame (m); whether something is there; whether nothing is known.
+
+    start, step: rad, the direction of the first beam, and to the next one.
+    """
 
     points: Floats
     met: Mask
     failed: Mask
+    start: float
+    step: float
+
+    def nearest_to(self, angles: Floats) -> NDArray[np.intp]:
+        """Return the row of the beam nearest to each direction; -1 for a direction outside of the scan."""
+        width = abs(self.step) or 2.0 * np.pi
+        turn = np.mod((angles - self.start) * (1.0 if self.step >= 0.0 else -1.0) + 0.5 * width, 2.0 * np.pi)
+        beam = np.floor(turn / width).astype(np.intp)
+        return np.where(beam < len(self.met), beam, -1)
 
 
-def read_beams(scan: Any, *, nan_is_free: bool = False) -> Beams:
-    """Return the beams of a LaserScan. nan_is_free: whether those that failed met nothing, as some drivers mean it.
+def read_beams(scan: Any, *, nan_is_free: bool = False, nearest: float = 0.0) -> Beams:
+    """Return the beams of a LaserScan. nan_is_free: whether NaN means that nothing is there, as some drivers mean it.
 
-    Raises InputError if its angles or its range are none, or if no beam measured anything.
+    nearest: m, below which a beam counts as failed. Raises InputError if its angles or its range are none, or if no
+    beam measured anything.
     """
     ranges = np.asarray(scan.ranges, np.float64)
     low, high, start, step = (
         float(each) for each in (scan.range_min, scan.range_max, scan.angle_min, scan.angle_increment)
     )
+    low = max(low, 0.0) if low == low else low
     if not low < high:
-        raise InputError(f"range_min, range_max: expected a range, got {low:g} to {high:g}")
+        raise InputError(f"range_min, range_max: expected a range, got {scan.range_min:g} to {high:g}")
     if not (abs(start) <= _LARGEST_ANGLE and abs(step) <= _LARGEST_ANGLE and (step or len(ranges) < 2)):
         raise InputError(f"angle_min, angle_increment: expected angles, got {start:g} and {step:g}")
     if len(ranges) > MOST_BEAMS:
         raise InputError(f"ranges: expected at most {MOST_BEAMS}, got {len(ranges)}")
-    near = ranges == -np.inf
-    met = ((ranges >= low) & (ranges <= high)) | near
-    failed = np.zeros(len(met), np.bool_) if nan_is_free else ~met & ~(ranges > high)  # NaN, or below range_min
-    if failed.all():
+    distance = np.where(ranges == -np.inf, low, np.where((ranges >= low) & (ranges > 0.0), ranges, np.nan))
+    met = (distance <= high) & (distance >= nearest)
+    failed = ~met & ~(ranges > high)  # NaN, below range_min, or too near to count
+    if nan_is_free:
+        failed &= ~np.isnan(ranges)
+    if failed.all() and not (nan_is_free and not len(ranges)):
         raise InputError(f"ranges: expected measurements, got none in {len(ranges)} beams; what was there stays")
-    distance = np.where(met, np.where(near, max(low, 0.0), ranges), 0.0)
+    distance[~met] = 0.0
     angle = start + step * np.arange(len(ranges))
-    return Beams(np.column_stack([distance * np.cos(angle), distance * np.sin(angle), 0.0 * angle]), met, failed)
-
-
-def scan_points(scan: Any) -> tuple[Floats, int]:
-    """Return the points (N, 3) in m of a LaserScan in its frame, and the number of NaN; beams may meet nothing."""
-    beams = read_beams(scan)
-    return beams.points[beams.met], int(np.count_nonzero(np.isnan(scan.ranges)))
+    points = np.column_stack([distance * np.cos(angle), distance * np.sin(angle), 0.0 * angle])
+    return Beams(points, met, failed, start, step)
 
 
 class BeamMemory:
-    """What each beam of a scanner met last, in the monitor's frame."""
+    """What the beams of a scanner met last, in the monitor's frame, and in which direction (rad).
+
+    A later scan may have other angles, or another number of beams: a point belongs to the beam nearest to its
+    direction. Points in directions that a scan does not have are forgotten.
+    """
 
     def __init__(self) -> None:
-        self._layout: tuple[Any, ...] = ()
+        self._frame = ""
         self._points = np.zeros((0, 3))
-        self._met = np.zeros(0, np.bool_)
+        self._angles = np.zeros(0)
 
-    def stays(self, beams: Beams, layout: tuple[Any, ...], frame: FrameMotion, used: Mask) -> Floats:
+    def stays(self, beams: Beams, name: str, frame: FrameMotion, used: Mask) -> Floats:
         """Take over what the beams meet; return the points (K, 3), in the scan's frame, of those that failed.
 
-        layout: what tells the beams, such as their angles; others are other beams. used (N,): which points count.
+        name: of the scan's frame; another frame is another scanner. used (N,): which points count.
         """
-        if layout != self._layout:
-            self._layout = layout
-            self._points, self._met = np.zeros_like(beams.points), np.zeros(len(beams.met), np.bool_)
         R = rotation_matrix(frame.quaternion)
-        measured = ~beams.failed
-        self._points[measured] = beams.points[measured] @ R.T + frame.position
-        self._met[measured] = (beams.met & used)[measured]
-        held = beams.failed & self._met
-        return np.asarray((self._points[held] - frame.position) @ R)
+        if name != self._frame:
+            self._frame, self._points, self._angles = name, np.zeros((0, 3)), np.zeros(0)
+        beam = beams.nearest_to(self._angles)
+        stays = (beam >= 0) & beams.failed[beam] if len(beams.failed) else beam >= 0
+        held = self._points[stays]
+        met = np.flatnonzero(beams.met & used)
+        self._points = np.concatenate([beams.points[met] @ R.T + frame.position, held])
+        self._angles = np.concatenate([beams.start + beams.step * met, self._angles[stays]])
+        return np.asarray((held - frame.position) @ R)

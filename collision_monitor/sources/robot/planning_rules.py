@@ -16,6 +16,9 @@ from collision_monitor.sources.robot.link_rules import LinkRules
 MOST_LINKS = 10_000
 """Links with a padding or a scale of their own."""
 
+_LONGEST_NAME = 256
+"""Characters of a link's name that are kept."""
+
 MOST_ALLOWED = 100_000
 """Pairs of a link or attached object and another object whose contact is expected."""
 
@@ -49,11 +52,13 @@ class PlanningRules:
             (content.link_scale, "scale", self._scale),
         ):
             for row in rows:
-                value, link = float(getattr(row, field)), str(row.link_name)
+                value, link = float(getattr(row, field)), str(row.link_name)[:_LONGEST_NAME]
                 if not (0.0 <= value < 1e3 and (value > 0.0 or field == "padding")):
                     scene.refuse(self._name, f"{field} of {link:.80}: expected a positive number, got {value}")
                 elif link in known or len(known) < MOST_LINKS:
-                    known[link[:256]] = value
+                    known[link] = value
+                else:
+                    scene.refuse(self._name, f"{field}: expected at most {MOST_LINKS} links, got more")
         return before != (self._matrix, self._padding, self._scale)
 
     def forget(self, name: str) -> None:

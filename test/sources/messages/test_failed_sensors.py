@@ -52,6 +52,9 @@ FAILED: dict[str, tuple[Any, dict[str, float]]] = {
     "angle_increment 0": ([1.0, INF, 2.0, INF], {"angle_increment": 0.0}),
     "angle_min NaN": ([1.0, INF, 2.0, INF], {"angle_min": NAN}),
     "angle_min of no angle": ([1.0, INF, 2.0, INF], {"angle_min": 1e30}),
+    "all 0 with range_min 0": ([0.0] * 4, {"range_min": 0.0}),
+    "negative with a negative range_min": ([-0.5] * 4, {"range_min": -1.0}),
+    "a range of negative numbers": ([1.0] * 4, {"range_min": -2.0, "range_max": -1.0}),
 }
 
 
@@ -97,6 +100,40 @@ def test_each_beam_that_fails_keeps_what_it_met_in_the_world() -> None:
     assert fed.feed.scene.points_dropped["scan"] == 1 + 2 + 3 + 2 + 0
 
 
+LATER: dict[str, tuple[Any, float, float]] = {
+    "another first angle": ([NAN, 1, NAN, NAN], 1e-5, 0.5),
+    "more beams": ([NAN, NAN, 1, NAN, NAN, NAN, NAN, NAN], 0.0, 0.25),
+    "fewer beams, the other way round": ([NAN, 1, NAN], 1.0, -0.5),
+    "another turn": ([NAN, 1, NAN, NAN], 2.0 * math.pi, 0.5),
+}
+
+
+@pytest.mark.parametrize("later", LATER)
+def test_beams_of_other_angles_that_fail_keep_what_was_met_in_their_direction(later: str) -> None:
+    ranges, start, step = LATER[later]
+    fed = Fed({"scan": {"topic": "/scan"}})
+    fed.give(*scan(0, [2.0, 3.0, 4.0, INF]))
+    first = points_of(fed)
+    fed.give("/scan", at(1), laser_scan("map", at(1), ranges, start=start, step=step))
+    now = points_of(fed)
+    expected = [first[0], [math.cos(0.5), math.sin(0.5), 0.0], first[2]]
+    np.testing.assert_allclose(now[np.argsort(np.arctan2(now[:, 1], now[:, 0]))], expected, atol=2e-5)
+    fed.give("/scan", at(2), laser_scan("map", at(2), [INF, NAN], start=math.pi, step=step))
+    assert fed.names[-1].startswith("-")  # the scanner looks elsewhere
+
+
+def test_what_is_nearer_than_the_file_allows_hides_what_is_behind_it() -> None:
+    """Dirt before the scanner does not make the wall behind it free."""
+    fed = Fed({"scan": {"topic": "/scan", "min_range": 0.6}})
+    fed.give(*scan(0, [2.0, 3.0, 0.5, INF]))
+    first = points_of(fed)
+    assert len(first) == 2
+    fed.give(*scan(1, [0.5, -INF, 0.5, 0.5]))  # refused: it measured nothing that counts
+    fed.give(*scan(2, [0.5, INF, 0.5, 0.5]))
+    np.testing.assert_allclose(points_of(fed), first[:1], atol=1e-9)
+    assert sum(fed.refused.values()) == 1
+
+
 def test_a_driver_that_writes_nan_for_nothing_can_say_so() -> None:
     fed = Fed({"scan": {"topic": "/scan", "nan_is_free": True}, "cloud": {"topic": "/cloud", "nan_is_free": True}})
     fed.give(*scan(0, [1.0, NAN, 2.0, NAN]))
@@ -105,6 +142,9 @@ def test_a_driver_that_writes_nan_for_nothing_can_say_so() -> None:
     fed.give(*scan(1, [NAN] * 4))
     fed.give("/cloud", at(1), point_cloud("map", at(1), [(NAN, 0, 0)]))
     assert fed.names == ["scan", "cloud", "-1", "-2"] and not fed.refused
+    fed.give(*scan(2, [1.0, NAN, 2.0, NAN]))
+    fed.give(*scan(3, [0.0, NAN, NAN, INF]))  # 0 is another failure
+    np.testing.assert_allclose(points_of(fed), [[1, 0, 0]], atol=1e-6)
 
 
 def test_a_cloud_without_a_finite_point_removes_nothing_and_an_empty_one_does() -> None:
@@ -112,7 +152,12 @@ def test_a_cloud_without_a_finite_point_removes_nothing_and_an_empty_one_does() 
     fed.give("/cloud", at(0), point_cloud("map", at(0), [(1, 0, 0)]))
     fed.give("/cloud", at(1), point_cloud("map", at(1), [(NAN, 0, 0), (INF, 0, 0)]))
     assert fed.names == ["cloud"] and "expected finite ones, got none of 2" in next(iter(fed.refused))
-    fed.give("/cloud", at(2), point_cloud("map", at(2), []))
+    fed.give("/cloud", at(2), point_cloud("map", at(2), [(3e38, 0, 0), (0, -1e30, 0)]))
+    kind, content = point_cloud("map", at(3), [(5, 0, 0)])
+    content.height = 0
+    fed.give("/cloud", at(3), (kind, content))
+    assert fed.names == ["cloud"] and sum(fed.refused.values()) == 3
+    fed.give("/cloud", at(4), point_cloud("map", at(4), []))
     assert fed.names == ["cloud", "-1"]
 
 
