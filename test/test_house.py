@@ -37,9 +37,6 @@ CALLED_FROM_OUTSIDE: Final = {
 }
 """Definitions that other packages call by their names."""
 
-CALLED_BY_TESTS: Final = {"tree_distance", "trees_touch", "separation_batch"}
-"""Kernels that only tests call for the time being."""
-
 CALLED_BY_ATTACKS: Final = {"read_failure"}
 """What `make fuzz` calls, so that people can play a reported failure again."""
 
@@ -67,7 +64,7 @@ def test_no_function_is_too_long_to_see_at_once() -> None:
 
 def test_every_definition_is_used_outside_of_the_tests() -> None:
     found = {each.split()[1] for each in house.unused(PACKAGE, house.texts_of_users())}
-    known = CALLED_FROM_OUTSIDE | CALLED_BY_TESTS | CALLED_BY_ATTACKS
+    known = CALLED_FROM_OUTSIDE | CALLED_BY_ATTACKS
     assert found <= known, "remove them, or say in docs what they are for"
     assert found >= CALLED_FROM_OUTSIDE
 

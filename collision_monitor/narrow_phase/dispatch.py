@@ -253,21 +253,9 @@ def _contacts(table: Any, position: Any, rotation: Any, pairs: Any, out: Any, wo
         pair_contact(table, a, b, pair_pose(position, rotation, a, b), out[k], work)
 
 
-@device
-def _separations(table: Any, position: Any, rotation: Any, pairs: Any, out: Any, work: Any) -> None:
-    for k in range(len(pairs)):
-        a, b = pairs[k, 0], pairs[k, 1]
-        out[k, 3] = separation(table, a, b, pair_pose(position, rotation, a, b), out[k], work)
-
-
 @kernel
 def _contact_serial(table: Any, position: Any, rotation: Any, pairs: Any, out: Any, work: Any) -> None:
     _contacts(table, position, rotation, pairs, out, work)
-
-
-@kernel
-def _separation_serial(table: Any, position: Any, rotation: Any, pairs: Any, out: Any, work: Any) -> None:
-    _separations(table, position, rotation, pairs, out, work)
 
 
 def contact_batch(
@@ -276,13 +264,4 @@ def contact_batch(
     """Contacts (M, CONTACT_SIZE) of the pairs (M, 2) of slots; position (K, 3) m, rotation (K, 3, 3) to world axes."""
     out = np.zeros((len(pairs), CONTACT_SIZE))
     _contact_serial(table, position, rotation, pairs, out, np.zeros(WORK_SIZE))
-    return out
-
-
-def separation_batch(
-    table: Any, position: NDArray[np.float64], rotation: NDArray[np.float64], pairs: NDArray[np.int32]
-) -> NDArray[np.float64]:
-    """Unit directions and certified lower bounds (m) of the distances, (M, 4); arguments as in `contact_batch`."""
-    out = np.zeros((len(pairs), 4))
-    _separation_serial(table, position, rotation, pairs, out, np.zeros(WORK_SIZE))
     return out

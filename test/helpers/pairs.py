@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
+from kernels import separation_batch
 
-from collision_monitor.narrow_phase.dispatch import contact_batch, separation_batch
+from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.shapes import registry as shapes
 from collision_monitor.shapes.shape_table import ShapeTableBuilder
 

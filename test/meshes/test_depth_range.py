@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from kernels import trees_touch
 from scipy.spatial.transform import Rotation
 
 from collision_monitor._jit import kernel
 from collision_monitor.meshes.distance.contact import tree_contact
 from collision_monitor.meshes.distance.depth_range import depth_range
 from collision_monitor.meshes.distance.nearest import MEMORY, answer_row
-from collision_monitor.meshes.overlap.touching_triangles import trees_touch
 from collision_monitor.meshes.placing import relative
 from collision_monitor.meshes.trees.shape_trees import made_tree
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE, DISTANCE

@@ -7,15 +7,15 @@ from itertools import product
 import numpy as np
 import pytest
 import trimesh
+from kernels import tree_distance, trees_touch
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 import collision_monitor as cm
 from collision_monitor.geometry.polyhedra import edge_face, locate_in_polyhedron
-from collision_monitor.meshes.distance.nearest import MEMORY, PAIRS, PLACE_A, PLACE_B, answer_row, tree_distance
+from collision_monitor.meshes.distance.nearest import MEMORY, PAIRS, PLACE_A, PLACE_B, answer_row
 from collision_monitor.meshes.extent import tree_extents
 from collision_monitor.meshes.layout import AXES, CENTER, CHILD, FACE, HALF, WIDTH
-from collision_monitor.meshes.overlap.touching_triangles import trees_touch
 from collision_monitor.meshes.trees import tree
 from collision_monitor.meshes.trees.tree import tree_of
 from collision_monitor.meshes.trees.tree_surface import surface_of

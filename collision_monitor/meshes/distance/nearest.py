@@ -14,14 +14,14 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device, inlined, kernel
+from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.vector import dot, minus, opposite
 from collision_monitor.meshes.boxes import raise_by_gaps, triangle_bounds
 from collision_monitor.meshes.boxes_below import boxes_below, count_of, first_of
 from collision_monitor.meshes.distance.leaf_bounds import farthest_along, least_of_pairs, raise_bounds
 from collision_monitor.meshes.distance.triangle_pair import Corners, closest_triangle_points
 from collision_monitor.meshes.layout import CENTER, CHILD, CORNERS, FACE, HALF, RADIUS, WIDTH
-from collision_monitor.meshes.placing import inverse, place_point, place_triangle, relative, turn_back
+from collision_monitor.meshes.placing import inverse, place_point, place_triangle, turn_back
 from collision_monitor.meshes.supports import content_reach_along, support_bounds
 from collision_monitor.tolerances import EPSILON
 
@@ -276,10 +276,3 @@ def nearest_triangles(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work
         least = min(least, work[3 * k])
     answer[LEAST] = sqrt(least)
     return found
-
-
-@kernel
-def tree_distance(tree_a, R_a, p_a, tree_b, R_b, p_b, limit, answer, work):
-    """`nearest_triangles` of two trees at poses given by rotations (3, 3) and positions (3,) (m)."""
-    p = p_b[0] - p_a[0], p_b[1] - p_a[1], p_b[2] - p_a[2]
-    return nearest_triangles(tree_a, 0, tree_b, 0, relative(R_a, R_b, p), limit, answer, work)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Any, Final
 
-from collision_monitor._jit import device, inlined, kernel
+from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.vector import Vector, along, cross, dot, minus
 from collision_monitor.meshes.boxes import box_separations, triangle_bounds
 from collision_monitor.meshes.distance.nearest import (
@@ -22,7 +22,7 @@ from collision_monitor.meshes.distance.nearest import (
 from collision_monitor.meshes.distance.triangle_pair import Corners, closest_triangle_points, crossing_point
 from collision_monitor.meshes.layout import CHILD, FACE, RADIUS, WIDTH
 from collision_monitor.meshes.overlap.leaf_planes import may_cross, may_touch
-from collision_monitor.meshes.placing import inverse, place_triangle, relative
+from collision_monitor.meshes.placing import inverse, place_triangle
 from collision_monitor.tolerances import PARALLEL_SIN2
 
 NOWHERE: Final = (0.0, 0.0, 0.0)
@@ -210,10 +210,3 @@ def deepest_touching(
             best, direction, point = depth, n, x
             answer[PLACE_A], answer[PLACE_B] = a, b
     return best, direction, point
-
-
-@kernel
-def trees_touch(tree_a, R_a, p_a, tree_b, R_b, p_b, most, work):
-    """`touching_triangles` of two trees at poses given by rotations (3, 3) and positions (3,) (m)."""
-    p = p_b[0] - p_a[0], p_b[1] - p_a[1], p_b[2] - p_a[2]
-    return touching_triangles(tree_a, 0, tree_b, 0, relative(R_a, R_b, p), most, work)

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from kernels import tree_distance
 from numpy.typing import NDArray
 from processor_time import within
 
@@ -14,7 +15,7 @@ from collision_monitor import Motion, Pose
 from collision_monitor._jit import kernel
 from collision_monitor.impact.body_impact import BodyPair, ImpactQuery, Window, chains_impact
 from collision_monitor.impact.impact_record import CLEAR, IMPACT
-from collision_monitor.meshes.distance.nearest import LEAST, answer_row, tree_distance
+from collision_monitor.meshes.distance.nearest import LEAST, answer_row
 from collision_monitor.meshes.distance.nearest import MEMORY as TREE_MEMORY
 from collision_monitor.meshes.distance.solid import MOST_EXAMINED
 from collision_monitor.meshes.trees.shape_trees import kept_tree

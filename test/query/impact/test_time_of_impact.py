@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import collision_monitor as cm
 from collision_monitor import Motion, Pose, contact, time_of_impact
-from collision_monitor.impact.pair_impacts import predict_pairs
+from collision_monitor.query.impact.impact_kernel import impact_of_chains
 
 ROCK = cm.ConvexHull(np.random.default_rng(3).normal(size=(16, 3)) * 0.4)
 SOLIDS = [cm.Sphere(0.4), cm.Box((0.7, 0.9, 0.5)), cm.Capsule(0.2, 0.8), cm.Cylinder(0.4, 0.7), cm.Cone(0.5, 0.9), ROCK]
@@ -245,7 +245,7 @@ def test_whole_numbers_are_numbers():
     """Integers are converted; else Numba compiles the kernels anew for a quarter of a minute."""
     answer = time_of_impact(cm.Sphere(1), Motion(Pose(), (1, 0, 0)), BOX, still(4, 0, 0), 9, 1, 0, np.int32(50))
     assert answer.status == "hit"
-    assert len(predict_pairs.signatures) == 1
+    assert len(impact_of_chains.signatures) == 1
 
 
 def test_separation_is_kept():
