@@ -109,7 +109,7 @@ def regridded(box: NDArray[np.void], capacity: int) -> HashedGrid:
 
 
 @device
-def _level_of(width):
+def _level_of(width: float) -> int:
     """Return the finest level with cells at least `width` wide."""
     if not width < 2.0**62:
         return GRID_LEVELS - 1
@@ -118,12 +118,12 @@ def _level_of(width):
 
 
 @device
-def _coordinate(x, cell):
+def _coordinate(x: Any, cell: Any) -> Any:
     return np.int64(min(max(np.floor(x / cell), -CELL_LIMIT), CELL_LIMIT))
 
 
 @inlined
-def _bucket(level, x, y, z, mask):
+def _bucket(level: Any, x: Any, y: Any, z: Any, mask: Any) -> Any:
     h = np.uint64(x) * np.uint64(0x9E3779B97F4A7C15) + np.uint64(y) * np.uint64(0xBF58476D1CE4E5B9)
     h += np.uint64(z) * np.uint64(0x94D049BB133111EB) + np.uint64(level) * np.uint64(0xD6E8FEB86659FD93)
     h = (h ^ (h >> np.uint64(32))) * np.uint64(0x9E3779B97F4A7C15)
@@ -131,7 +131,7 @@ def _bucket(level, x, y, z, mask):
 
 
 @device
-def remove_box(grid, i):
+def remove_box(grid: HashedGrid, i: int) -> None:
     """Remove box i from the grid; do nothing if it is not in the grid."""
     box = grid.box[i]
     if box.level < 0:
@@ -154,17 +154,17 @@ def remove_box(grid, i):
 
 
 @inlined
-def _low(centre, half, rounding):
+def _low(centre: float, half: float, rounding: float) -> float:
     return centre - half - (rounding * (abs(centre) + half) + SMALLEST)
 
 
 @inlined
-def _high(centre, half, rounding):
+def _high(centre: float, half: float, rounding: float) -> float:
     return centre + half + (rounding * (abs(centre) + half) + SMALLEST)
 
 
 @inlined
-def _write_bounds(node, box):
+def _write_bounds(node: Any, box: Region) -> None:
     """Write the bounds of a box (a Region), rounded outwards, into its node."""
     node.low_x = np.float32(min(_low(box.x, box.hx, FLOAT32_ROUNDING), LARGEST_FLOAT32))
     node.low_y = np.float32(min(_low(box.y, box.hy, FLOAT32_ROUNDING), LARGEST_FLOAT32))
@@ -175,7 +175,7 @@ def _write_bounds(node, box):
 
 
 @inlined
-def _may_overlap(low, high, node):
+def _may_overlap(low: Any, high: Any, node: Any) -> Any:
     """Whether the bounds of a node meet the corners `low` and `high` (m) of a box; True if the boxes overlap."""
     # no branches: each would be taken at random
     along_x = (low[0] <= node.high_x) & (node.low_x <= high[0])
@@ -184,7 +184,7 @@ def _may_overlap(low, high, node):
 
 
 @device
-def put_box(grid, i, region):
+def put_box(grid: HashedGrid, i: int, region: Region) -> None:
     """Insert box i with the bounds `region`, or move it there."""
     remove_box(grid, i)
     box, node = grid.box[i], grid.node[i]
@@ -211,7 +211,7 @@ def put_box(grid, i, region):
 
 
 @device
-def query_box(grid, box, i, found):
+def query_box(grid: Any, box: Any, i: Any, found: Any) -> Any:
     """Write all boxes except number i that overlap `box` (a Region or a GRID_BOX) to found[0:n], unordered.
 
     Returns n. If n is larger than found.size, the rest was counted but not written.
@@ -271,7 +271,7 @@ def query_box(grid, box, i, found):
 
 
 @kernel
-def put_boxes(grid, which, centre, half):
+def put_boxes(grid: HashedGrid, which: Any, centre: Any, half: Any) -> None:
     """Insert the boxes `which` (M,) with centre, half (N, 3) in m, indexed by box number."""
     for k in range(which.size):
         i = which[k]
@@ -280,7 +280,7 @@ def put_boxes(grid, which, centre, half):
 
 
 @kernel
-def read_boxes(box, centre, half):
+def read_boxes(box: Any, centre: Any, half: Any) -> None:
     """Copy the first N boxes (GRID_BOX) into centre, half (N, 3) in m.
 
     A box that is not in the grid gets a NaN half extent, so that it meets nothing.
@@ -293,14 +293,14 @@ def read_boxes(box, centre, half):
 
 
 @kernel
-def remove_boxes(grid, which):
+def remove_boxes(grid: HashedGrid, which: Any) -> None:
     """Remove the boxes `which` (M,)."""
     for k in range(which.size):
         remove_box(grid, which[k])
 
 
 @allocating_kernel
-def query_boxes(grid, which, pairs):
+def query_boxes(grid: Any, which: Any, pairs: Any) -> Any:
     """Write all (i, j) with i in `which` (M,) and j overlapping i to pairs (P, 2); return their number.
 
     If the number exceeds P, call again with a larger array.

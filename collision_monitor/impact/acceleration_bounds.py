@@ -11,6 +11,7 @@ from math import inf
 from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, kernel
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.impact.body_impact import ShapePair, Tube, Window, contact_at, shape_impact
 from collision_monitor.impact.impact_record import CLEAR, UNRESOLVED
 from collision_monitor.motion.bodies import next_pair
@@ -34,7 +35,7 @@ class Intervals(NamedTuple):
 
 
 @device
-def _first_possible(multibody, i, j, until, off, query, work):
+def _first_possible(multibody: Any, i: int, j: int, until: float, off: Vector, query: Any, work: Any) -> float:
     """Return a time in [0, until] before which the bodies cannot touch; off: their deviation (m), a polynomial in t."""
     table, parts, bodies = multibody
     A, B = work.motion[0], work.motion[1]
@@ -56,7 +57,7 @@ def _first_possible(multibody, i, j, until, off, query, work):
 
 
 @device
-def _first_certain(multibody, i, j, window, off, margin, work):
+def _first_certain(multibody: Any, i: int, j: int, window: Window, off: Vector, margin: float, work: Any) -> float:
     """Return a time in the window at which the bodies touch however they accelerate; infinite: none found."""
     table, parts, bodies = multibody
     A, B = work.motion[0], work.motion[1]
@@ -75,14 +76,16 @@ def _first_certain(multibody, i, j, window, off, margin, work):
 
 
 @device
-def _bound(bodies, spread, i):
+def _bound(bodies: Any, spread: Any, i: int) -> float:
     """Largest acceleration of any point of body i relative to its stated motion (m/s^2)."""
     turning = spread.acceleration[i, 1]
     return spread.acceleration[i, 0] + (turning * bodies.spin_radius[i] if turning > 0.0 else 0.0)
 
 
 @kernel
-def widen_intervals(multibody, spread, intervals, now, horizon, query, work):
+def widen_intervals(
+    multibody: Any, spread: Any, intervals: Intervals, now: float, horizon: float, query: Any, work: Any
+) -> None:
     """Widen intervals (Intervals) by the acceleration bounds that the bodies declare. horizon: s after `now`.
 
     If a body can avoid contact, the upper end becomes infinite and the status UNRESOLVED.

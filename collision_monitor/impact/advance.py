@@ -18,7 +18,7 @@ from math import copysign, inf, sqrt
 from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.geometry.vector import cross, dot
+from collision_monitor.geometry.vector import Vector, cross, dot
 from collision_monitor.narrow_phase.core import rounding
 from collision_monitor.shapes.calls import core_box, core_support, is_centred_box
 from collision_monitor.shapes.kinds.sphere import SPHERE
@@ -64,7 +64,7 @@ class Axis(NamedTuple):
 
 
 @inlined
-def _seen_from(R, n, k):
+def _seen_from(R: Any, n: Vector, k: Vector) -> Axis:
     """The direction n, which changes by k per second, in the axes of a shape with rotation R (3, 3)."""
     return Axis(
         n[0] * R[0, 0] + n[1] * R[1, 0] + n[2] * R[2, 0],
@@ -77,7 +77,7 @@ def _seen_from(R, n, k):
 
 
 @inlined
-def _bend(table, s, w, u, offset):
+def _bend(table: Any, s: int, w: Vector, u: Vector, offset: Vector) -> float:
     """Share in c, the bound on the remainder (m/s^2), of a core that turns at w; the axis turns at u."""
     d = (w[0] - u[0], w[1] - u[1], w[2] - u[2])
     c = cross(w, u)
@@ -92,7 +92,7 @@ def _bend(table, s, w, u, offset):
 
 
 @inlined
-def advance_along_axis(table, at, n, m, rate, gap, until):
+def advance_along_axis(table: Any, at: Placed, n: Vector, m: Vector, rate: float, gap: float, until: float) -> float:
     """Return a time d in (0, until] (s) up to which the gap along the axis n (unit) stays positive; close to the last.
 
     m: change of n per second, across it (1/s). rate: growth of the gap without motion, from the tube (m/s). gap: along
@@ -119,14 +119,14 @@ def advance_along_axis(table, at, n, m, rate, gap, until):
 
 
 @inlined
-def _line(size, x, dx, d):
+def _line(size: float, x: float, dx: float, d: float) -> tuple[float, float]:
     """The line that size |x + d dx| follows near d: its depth below size |x| at d = 0, and its slope."""
     side = copysign(size, x + d * dx)
     return size * abs(x) - side * x, side * dx
 
 
 @inlined
-def _between_boxes(sa, sb, A, B, gap, remaining):
+def _between_boxes(sa: Vector, sb: Vector, A: Axis, B: Axis, gap: Gap, remaining: float) -> float:
     """`advance_along_axis` for cores that are boxes: the minimum of parabolas, one for each choice of sides.
 
     Newton's method from outside: the roots decrease until the parabola at a root is the one that gave the root.
@@ -155,7 +155,7 @@ def _between_boxes(sa, sb, A, B, gap, remaining):
 
 
 @inlined
-def _gap_after(table, shapes, A, B, h, gap, d):
+def _gap_after(table: Any, shapes: Any, A: Axis, B: Axis, h: Any, gap: Gap, d: float) -> float:
     """Lower bound on the gap after d seconds (m); h: the support values of both shapes at d = 0."""
     a, b = shapes
     h_a, h_b = h
@@ -168,7 +168,7 @@ def _gap_after(table, shapes, A, B, h, gap, d):
 
 
 @device
-def _between_any(table, shapes, A, B, gap, remaining):
+def _between_any(table: Any, shapes: Any, A: Axis, B: Axis, gap: Gap, remaining: float) -> float:
     """`advance_along_axis` for all cores: brackets the root of the bound between times outside (bound < 0) and inside.
 
     The root of a chord lies inside, because the bound is concave and the chord lies below it.

@@ -50,7 +50,7 @@ class Now(NamedTuple):
 
 
 @inlined
-def relative_now(bodies, i, j, time):
+def relative_now(bodies: Any, i: int, j: int, time: float) -> Now:
     """Compute body j relative to body i at `time` (s)."""
     age_i, age_j = age_of(bodies, i, time), age_of(bodies, j, time)
     p = (
@@ -67,13 +67,13 @@ def relative_now(bodies, i, j, time):
 
 
 @inlined
-def widening(now, stale_acceleration):
+def widening(now: Now, stale_acceleration: float) -> float:
     """Deviation (m) of both bodies by unknown accelerations. A stale object widens the bounds of its contacts here."""
     return 0.5 * stale_acceleration * (now.age_i * now.age_i + now.age_j * now.age_j)
 
 
 @inlined
-def closing_now(bodies, i, j, now, row):
+def closing_now(bodies: Any, i: int, j: int, now: Now, row: Any) -> float:
     """Speed (m/s) at which the witness points of a contact row about body i approach."""
     wa = (bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2])
     wb = (bodies.angular[j, 0], bodies.angular[j, 1], bodies.angular[j, 2])
@@ -81,7 +81,7 @@ def closing_now(bodies, i, j, now, row):
 
 
 @inlined
-def move_to_world(bodies, i, now, row):
+def move_to_world(bodies: Any, i: int, now: Now, row: Any) -> None:
     """Move the witness points of a contact row about body i to the world's origin."""
     for c in range(3):
         at = position_now(bodies, i, now.age_i, c)
@@ -90,7 +90,10 @@ def move_to_world(bodies, i, now, row):
 
 
 @device
-def chains_contact(table, parts, first_a, first_b, pose, limit, effort, scratch, result):
+def chains_contact(
+    table: Any, parts: Any, first_a: int, first_b: int, pose: PairPose, limit: float, effort: int, scratch: Any,
+    result: Any,
+) -> tuple[float, int]:  # fmt: skip
     """Write the deepest contact of two chains of shapes (`Parts`), if it is at most `limit` (m), into a result row.
 
     pose: rotations of both bodies, not in scratch.rotation[2:4], and position of B relative to A. effort: see
@@ -120,7 +123,7 @@ def chains_contact(table, parts, first_a, first_b, pose, limit, effort, scratch,
 
 
 @outlined
-def chains_overlap(table, parts, first_a, first_b, pose, scratch):
+def chains_overlap(table: Any, parts: Any, first_a: Any, first_b: Any, pose: Any, scratch: Any) -> Any:
     """Whether two chains have a point in common. Arguments as for `chains_contact`."""
     R_a, R_b, p = scratch.rotation[2], scratch.rotation[3], pose.p
     a, b, oa = first_a, first_b, (0.0, 0.0, 0.0)
@@ -136,7 +139,9 @@ def chains_overlap(table, parts, first_a, first_b, pose, scratch):
 
 
 @outlined
-def body_contact(multibody, i, j, time, query, scratch, result):
+def body_contact(
+    multibody: Any, i: int, j: int, time: float, query: ContactQuery, scratch: Any, result: Any
+) -> tuple[bool, int]:
     """Write the deepest contact of bodies i and j at `time` (s), from their last states, into a result row.
 
     The error bound includes the excess of the bodies' models, and what they may have accelerated since their last
@@ -171,7 +176,7 @@ def body_contact(multibody, i, j, time, query, scratch, result):
 
 
 @device
-def bounded_contact(bodies, i, j, now, reach, result):
+def bounded_contact(bodies: Any, i: int, j: int, now: Now, reach: float, result: Any) -> None:
     """Write a contact from the bounding spheres alone into a result row, with the status UNRESOLVED.
 
     Its distance is that of the centres; the true one differs by at most `reach` (m). now: the two bodies (Now).

@@ -14,6 +14,7 @@ import numpy as np
 
 from collision_monitor._jit import device, inlined, outlined
 from collision_monitor._jit.vectors import LANES
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.impact.advance import Placed, advance_along_axis
 from collision_monitor.impact.impact_record import (
     CLEAR,
@@ -111,7 +112,7 @@ def make_scratch() -> Scratch:
 
 
 @inlined
-def _turning(before, n, elapsed):
+def _turning(before: Vector, n: Vector, elapsed: float) -> Vector:
     """Change per second, across n, of a unit vector that was `before` and is n after `elapsed` (s)."""
     x, y, z = (n[0] - before[0]) / elapsed, (n[1] - before[1]) / elapsed, (n[2] - before[2]) / elapsed
     along = x * n[0] + y * n[1] + z * n[2]
@@ -124,7 +125,9 @@ def _turning(before, n, elapsed):
 
 
 @outlined
-def shape_impact(table, parts, pair, window, tube, query, scratch):
+def shape_impact(
+    table: Any, parts: Any, pair: ShapePair, window: Window, tube: Tube, query: ImpactQuery, scratch: Scratch
+) -> tuple[int, float, int, float]:
     """Find the first time in the window at which the gap between the shapes of a pair (ShapePair) is the wanted one.
 
     The wanted gap is query.margin plus the tube, whose time begins with the window.
@@ -184,7 +187,7 @@ def shape_impact(table, parts, pair, window, tube, query, scratch):
 
 
 @device
-def contact_at(table, parts, pair, t, scratch):
+def contact_at(table: Any, parts: Any, pair: ShapePair, t: float, scratch: Scratch) -> float:
     """Write the contact of a pair of shapes (ShapePair) at time t into scratch.out; return the signed distance (m).
 
     scratch.out holds a contact row about A's origin, followed by the closing speed (m/s).
@@ -193,7 +196,7 @@ def contact_at(table, parts, pair, t, scratch):
 
 
 @outlined
-def _contact_at(table, parts, pair, t, places, scratch):
+def _contact_at(table: Any, parts: Any, pair: ShapePair, t: float, places: Any, scratch: Scratch) -> float:
     """`contact_at`, or if there are places of two triangles (mesh_pair.py), the contact of these."""
     A, B, a, b = pair
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
@@ -217,7 +220,7 @@ def _contact_at(table, parts, pair, t, places, scratch):
 
 
 @inlined
-def closing_speed(v, wa, wb, p, out):
+def closing_speed(v: Vector, wa: Vector, wb: Vector, p: Vector, out: Any) -> float:
     """Speed (m/s) at which the witness points of a contact row `out` about A's origin approach along its normal.
 
     v, p: velocity and position of B relative to A; wa, wb: angular velocities.
@@ -231,7 +234,10 @@ def closing_speed(v, wa, wb, p, out):
 
 
 @device
-def _certain_overlap(table, parts, pair, start, guess, places, window, tube, query, scratch):
+def _certain_overlap(
+    table: Any, parts: Any, pair: ShapePair, start: float, guess: float, places: Any, window: Window, tube: Tube,
+    query: ImpactQuery, scratch: Scratch,
+) -> float:  # fmt: skip
     """Return a time in [start, window.end] at which a pair overlaps by more than the tube; inf: none found.
 
     places: as for `_contact_at`; two triangles that overlap are enough.
@@ -262,7 +268,10 @@ def _certain_overlap(table, parts, pair, start, guess, places, window, tube, que
 
 
 @outlined
-def first_overlap(table, parts, pair, near, window, tube, query, scratch):
+def first_overlap(
+    table: Any, parts: Any, pair: ShapePair, near: Any, window: Window, tube: Tube, query: ImpactQuery,
+    scratch: Scratch,
+) -> tuple[float, float]:  # fmt: skip
     """Return a time at which a pair of shapes certainly overlaps, infinite for none, and that of the contact found.
 
     near: what `shape_impact` found: status, time, guess, and places as for `_contact_at`. The contact in scratch.out is
@@ -282,7 +291,7 @@ def first_overlap(table, parts, pair, near, window, tube, query, scratch):
 
 
 @inlined
-def tube_of(A, B, begin):
+def tube_of(A: Any, B: Any, begin: float) -> Tube:
     """The tube of two motions (MOTION) together, from `begin` on. Stale objects have widened it (tracking.py)."""
     return Tube(
         A.tube_0 + B.tube_0 + A.tube_1 * (begin - A.tube_time) + B.tube_1 * (begin - B.tube_time),
@@ -302,7 +311,9 @@ class BodyPair(NamedTuple):
 
 
 @device
-def body_impact(multibody, i, j, window, query, scratch, event):
+def body_impact(
+    multibody: Any, i: int, j: int, window: Window, query: ImpactQuery, scratch: Scratch, event: Any
+) -> int:
     """Write the first impact of bodies i and j in the window into the IMPACT record `event`.
 
     event.status = CLEAR if there is none. BodyPair that overlap, or are within query.margin, at the begin have their
@@ -323,7 +334,9 @@ def body_impact(multibody, i, j, window, query, scratch, event):
 
 
 @device
-def chains_impact(table, parts, pair, window, query, scratch, event):
+def chains_impact(
+    table: Any, parts: Any, pair: BodyPair, window: Window, query: ImpactQuery, scratch: Scratch, event: Any
+) -> int:
     """`body_impact` of two chains of shapes (`BodyPair`), without what names the bodies in the record.
 
     This is the impact of any two bodies: of the monitor, of single queries and of their batches.
@@ -373,7 +386,7 @@ def chains_impact(table, parts, pair, window, query, scratch, event):
 
 
 @inlined
-def _set_geometry(event, A, t, out):
+def _set_geometry(event: Any, A: Any, t: float, out: Any) -> None:
     """Set point, normal and closing speed of the impact from a contact at time t about A's origin."""
     ta = t - A.time
     event.point_x = A.x + (A.vx + 0.5 * A.ax * ta) * ta + 0.5 * (out[POINT_A] + out[POINT_B])
@@ -384,7 +397,9 @@ def _set_geometry(event, A, t, out):
 
 
 @inlined
-def _sphere_impact(pair, approach, reach, tube, window, first, event):
+def _sphere_impact(
+    pair: ShapePair, approach: Any, reach: float, tube: Tube, window: Window, first: float, event: Any
+) -> None:
     """Impact of two spheres, in closed form at both ends. first: the lower end (s after the window's begin)."""
     begin, end = window
     event.method = CLOSED_FORM

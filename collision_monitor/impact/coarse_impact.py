@@ -9,7 +9,7 @@ gap of at least the motion in a step.
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -42,7 +42,7 @@ TRIES: Final = (1.5, 4.0)
 
 
 @device
-def _write_hit(pair, t, event, out):
+def _write_hit(pair: ShapePair, t: float, event: Any, out: Any) -> None:
     """Set what a certain collision at time t (s) has, from the contact of two triangles about A's origin."""
     A, B = pair.A, pair.B
     ta = t - A.time
@@ -56,7 +56,7 @@ def _write_hit(pair, t, event, out):
 
 
 @device
-def _overlaps(table, parts, pair, t, allowed, scratch):
+def _overlaps(table: Any, parts: Any, pair: ShapePair, t: float, allowed: float, scratch: Any) -> bool:
     """Whether shapes overlap at time t (s) by more than `allowed` (m); then scratch.out has the contact about A."""
     out = scratch.out
     p, _ = tree_approach_at(table, parts, pair, t, 0.0, 0.0, t, scratch)
@@ -71,7 +71,7 @@ def _overlaps(table, parts, pair, t, allowed, scratch):
 
 
 @inlined
-def _together(A, B, window, margin):
+def _together(A: Any, B: Any, window: Window, margin: float) -> tuple[float, float]:
     """First and last time (s) after the begin of a window at which the bounding spheres of two motions may overlap."""
     begin, end = window
     tube, approach = tube_of(A, B, begin), relative_motion_at(A, B, begin)
@@ -80,7 +80,9 @@ def _together(A, B, window, margin):
 
 
 @outlined
-def coarse_impact(multibody, i, j, window, query, ending, scratch, event):
+def coarse_impact(
+    multibody: Any, i: int, j: int, window: Window, query: Any, ending: SearchEnd, scratch: Any, event: Any
+) -> bool:
     """Write a bound on the first impact of two bodies with `has_bounds` into the IMPACT record `event`.
 
     event.status = CLEAR if there is none. Returns False if only a full search can tell, because one of the bodies is
@@ -121,7 +123,7 @@ def coarse_impact(multibody, i, j, window, query, ending, scratch, event):
 
 
 @inlined
-def has_bounds(multibody, i, j):
+def has_bounds(multibody: Any, i: int, j: int) -> bool:
     """Whether two bodies are one shape each, one of them a mesh or a cloud, and none of them a half-space."""
     table, parts, bodies = multibody
     a, b = bodies.first_shape[i], bodies.first_shape[j]
@@ -136,7 +138,9 @@ def has_bounds(multibody, i, j):
 
 @direct
 @kernel
-def predict_coarsely(multibody, pairs, now, query, ending, events, scratch):
+def predict_coarsely(
+    multibody: Any, pairs: Any, now: float, query: Any, ending: SearchEnd, events: Any, scratch: Any
+) -> tuple[int, int]:
     """As `predict_pairs`, but with bounds on the impacts of pairs with `has_bounds`. ending: SearchEnd."""
     bodies = multibody.bodies
     n = queries = 0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +47,7 @@ IMPACT = np.dtype(
 
 
 @inlined
-def pair_key(id_a, id_b):
+def pair_key(id_a: Any, id_b: Any) -> Any:
     """Key of a pair: (smaller id << 32) | larger id. Pairs sorted by key are sorted by their ids."""
     return (np.uint64(min(id_a, id_b)) << np.uint64(32)) | np.uint64(max(id_a, id_b))
 
@@ -59,7 +59,7 @@ def pair_keys(id_a: NDArray[np.uint32], id_b: NDArray[np.uint32]) -> NDArray[np.
 
 
 @inlined
-def ids_of(key):
+def ids_of(key: Any) -> Any:
     """The smaller and the larger id of a pair."""
     return key >> np.uint64(32), key & np.uint64(0xFFFFFFFF)
 
@@ -70,7 +70,7 @@ def ids_of_keys(keys: NDArray[np.uint64]) -> tuple[NDArray[np.uint64], NDArray[n
 
 
 @inlined
-def write_pair(bodies, i, j, record):
+def write_pair(bodies: Any, i: int, j: int, record: Any) -> None:
     """Write key, slots and versions of the pair of bodies i and j into a record (IMPACT, or one with these fields).
 
     Body i must have the smaller id.
@@ -81,6 +81,6 @@ def write_pair(bodies, i, j, record):
 
 
 @inlined
-def holds(version, record):
+def holds(version: Any, record: Any) -> bool:
     """Whether the motions that the record rests on are unchanged. version (N,): the bodies' current versions."""
     return version[record.i] == record.version_i and version[record.j] == record.version_j

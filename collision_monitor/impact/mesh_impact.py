@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from collision_monitor._jit import device
 from collision_monitor.impact.impact_record import CLEAR, HIT, UNRESOLVED
 from collision_monitor.impact.mesh_pair import enclosure, have_trees, is_mesh
@@ -13,7 +15,9 @@ from collision_monitor.narrow_phase.pair_pose import PairPose
 
 
 @device
-def mesh_impact(table, parts, pair, window, tube, query, ending, scratch):
+def mesh_impact(
+    table: Any, parts: Any, pair: Any, window: Any, tube: Any, query: Any, ending: Any, scratch: Any
+) -> tuple[int, float, int, float]:
     """`shape_impact` of a pair (ShapePair) with a mesh or a cloud; one that is in the other has its impact at once.
 
     ending: when the search ends early, see `tree_impact`.
@@ -34,7 +38,7 @@ def mesh_impact(table, parts, pair, window, tube, query, ending, scratch):
 
 
 @device
-def _enclosure_at(table, parts, pair, t, scratch):
+def _enclosure_at(table: Any, parts: Any, pair: Any, t: float, scratch: Any) -> int:
     """`enclosure` of a pair at time t (s)."""
     p, _ = tree_approach_at(table, parts, pair, t, 0.0, 0.0, t, scratch)
     return enclosure(table, pair.a, pair.b, PairPose(scratch.rotation[2], scratch.rotation[3], p), scratch)

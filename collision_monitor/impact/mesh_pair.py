@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from math import inf, sqrt
+from typing import Any
 
 from collision_monitor._jit import device, inlined, outlined
-from collision_monitor.geometry.vector import along, dot, minus, opposite, rotate, rotate_back, sum_of_sizes
+from collision_monitor.geometry.vector import Vector, along, dot, minus, opposite, rotate, rotate_back, sum_of_sizes
 from collision_monitor.meshes.distance.contact import APART, FARTHER, OPEN, tree_contact
 from collision_monitor.meshes.distance.feature import (
     feature_in_triangle,
@@ -46,24 +47,24 @@ the triangles are in the other solid, if that is convex, which is deeper and tak
 
 
 @inlined
-def has_mesh(table, a, b):
+def has_mesh(table: Any, a: int, b: int) -> bool:
     """Whether one of two shapes is a mesh or a cloud."""
     return is_mesh(table, a) or is_mesh(table, b)
 
 
 @inlined
-def is_mesh(table, s):
+def is_mesh(table: Any, s: int) -> bool:
     """Whether a shape is a mesh or a cloud."""
     return table.kind[s] == MESH or table.kind[s] == POINTS
 
 
 @inlined
-def _has_tree(table, s):
+def _has_tree(table: Any, s: int) -> bool:
     return table.size[s, TREE] > 0.0 and table.kind[s] != HALF_SPACE
 
 
 @inlined
-def have_trees(table, a, b):
+def have_trees(table: Any, a: int, b: int) -> bool:
     """Whether the trees of both shapes meet. A cloud meets convex solids point by point, which tells how deep."""
     if not (_has_tree(table, a) and _has_tree(table, b)):
         return False
@@ -73,20 +74,20 @@ def have_trees(table, a, b):
 
 
 @inlined
-def root_of(table, s):
+def root_of(table: Any, s: int) -> int:
     """First block of a shape's tree."""
     return int(table.size[s, TREE]) - 1
 
 
 @inlined
-def _may_hold_many(table, a, b):
+def _may_hold_many(table: Any, a: int, b: int) -> bool:
     """Whether shape a has an inside, and b so many parts that their number decides what it costs to locate them."""
     first, second = root_of(table, a), root_of(table, b)
     return table.blocks[first, CLOSED, 1] != 0.0 and table.blocks[second, PARTS, 1] > MOST_PARTS
 
 
 @device
-def enclosure(table, a, b, pose, scratch):
+def enclosure(table: Any, a: int, b: int, pose: Any, scratch: Any) -> int:
     """INSIDE if one shape is in the solid that the other one, a mesh, bounds; UNKNOWN if round-off leaves it open.
 
     No surfaces meet. pose: as for every pair test, of two shapes with a mesh or a cloud among them.
@@ -111,7 +112,7 @@ def enclosure(table, a, b, pose, scratch):
 
 
 @outlined
-def mesh_within(table, a, b, pose, limit, effort, out, scratch):
+def mesh_within(table: Any, a: int, b: int, pose: Any, limit: float, effort: int, out: Any, scratch: Any) -> bool:
     """Whether the distance of two shapes with trees, or of one and a solid, is at most `limit` (m); writes the contact.
 
     If they overlap, the depth is that of the deepest pair of triangles or points; a translation that parts them may be
@@ -125,13 +126,13 @@ def mesh_within(table, a, b, pose, limit, effort, out, scratch):
 
 
 @inlined
-def is_polytope(table, s):
+def is_polytope(table: Any, s: int) -> bool:
     """Whether a shape is a convex polytope."""
     return table.kind[s] == BOX or table.kind[s] == CONVEX_HULL
 
 
 @device
-def _trees_within(table, a, b, pose, limit, out, scratch):
+def _trees_within(table: Any, a: int, b: int, pose: Any, limit: float, out: Any, scratch: Any) -> tuple[bool, int]:
     """`mesh_within` of two shapes by their trees, in the canonical order of the pair tests, and what is known."""
     p = pose.p
     is_swapped = is_second(table, a, b, p)
@@ -165,7 +166,7 @@ def _trees_within(table, a, b, pose, limit, out, scratch):
 
 
 @device
-def _solid_within(table, a, b, pose, limit, out, scratch):
+def _solid_within(table: Any, a: int, b: int, pose: Any, limit: float, out: Any, scratch: Any) -> bool:
     """`mesh_within` of a tree and a convex solid."""
     p = pose.p
     is_swapped = not is_mesh(table, a)
@@ -192,7 +193,7 @@ def _solid_within(table, a, b, pose, limit, out, scratch):
 
 
 @device
-def _name_feature(table, s, place, x, n, out, side):
+def _name_feature(table: Any, s: int, place: float, x: Vector, n: Vector, out: Any, side: int) -> None:
     """Write the feature of a mesh, a cloud or a hull at a point x of the triangle at a place, for a normal n.
 
     The triangle itself tells it, because a normal of two triangles need not be one of the solids at that point.
@@ -214,7 +215,7 @@ def _name_feature(table, s, place, x, n, out, side):
 
 
 @device
-def triangles_contact(table, a, b, pose, places, out):
+def triangles_contact(table: Any, a: int, b: int, pose: Any, places: Any, out: Any) -> None:
     """Write the contact of two triangles of shapes with trees, at places as in `meshes.distance.nearest`."""
     X = relative(pose.R_A, pose.R_B, pose.p)
     depth, n, x = contact_of_places(table.blocks, places[0], table.blocks, places[1], X)
@@ -224,7 +225,7 @@ def triangles_contact(table, a, b, pose, places, out):
 
 
 @inlined
-def shapes_within(table, a, b, pose, limit, effort, out, scratch):
+def shapes_within(table: Any, a: int, b: int, pose: Any, limit: float, effort: int, out: Any, scratch: Any) -> bool:
     """`contact_within` of any two shapes, meshes included; effort: see `mesh_within`."""
     if has_mesh(table, a, b):
         return mesh_within(table, a, b, pose, limit, effort, out, scratch)
@@ -232,7 +233,7 @@ def shapes_within(table, a, b, pose, limit, effort, out, scratch):
 
 
 @device
-def shapes_overlap(table, a, b, pose, scratch):
+def shapes_overlap(table: Any, a: int, b: int, pose: Any, scratch: Any) -> bool:
     """Whether two shapes have a point in common, of an open mesh on its surface; meshes whose test is too long may."""
     if has_mesh(table, a, b) and have_trees(table, a, b) and table.margin[a] + table.margin[b] == 0.0:
         X, blocks, work = relative(pose.R_A, pose.R_B, pose.p), table.blocks, scratch.tree

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Final
+from typing import Any, Final
 
 from collision_monitor._jit import inlined, outlined
 from collision_monitor.geometry.vector import dot, sum_of_sizes
@@ -30,14 +30,16 @@ Smaller: it is sought for meshes that graze each other too, whose time is late b
 
 
 @inlined
-def _wanted(table, pair, t, window, tube, query):
+def _wanted(table: Any, pair: Any, t: float, window: Any, tube: Any, query: Any) -> float:
     """Depth (m) beyond which nothing that is uncertain at t parts two solids, apart from round-off."""
     known = query.margin + table.margin[pair.a] + table.margin[pair.b]
     return max(tube.start + tube.growth * (t - window.begin) - known, 0.0)
 
 
 @outlined
-def overlap_time(table, parts, pair, known, window, tube, query, scratch):
+def overlap_time(
+    table: Any, parts: Any, pair: Any, known: Any, window: Any, tube: Any, query: Any, scratch: Any
+) -> float:
     """Return a time in the window (s) at which both solids certainly contain a common ball, or the one that is known.
 
     known: the times from which on they may touch, and from which on they certainly overlap, infinite for none. If the

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import inf, isfinite
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -20,7 +20,7 @@ PREFETCH_AHEAD: Final = 4
 
 
 @inlined
-def window_of(bodies, i, j, now):
+def window_of(bodies: Any, i: int, j: int, now: float) -> Window:
     """Times for which the pair has to be predicted now: from where it was predicted to, until both cover times.
 
     Empty (begin >= end) if nothing is left to predict.
@@ -30,14 +30,14 @@ def window_of(bodies, i, j, now):
 
 
 @inlined
-def cover_of(bodies, i, j):
+def cover_of(bodies: Any, i: int, j: int) -> float:
     """Time until which both bodies are predicted (s)."""
     return min(bodies.motion[i].cover, bodies.motion[j].cover)
 
 
 @direct
 @kernel
-def predict_pairs(multibody, pairs, now, query, events, scratch):
+def predict_pairs(multibody: Any, pairs: Any, now: float, query: Any, events: Any, scratch: Any) -> tuple[int, int]:
     """Write the first impacts of pairs (P, 2) until both bodies' cover times into events (IMPACT).
 
     The search begins at `now`, or at the time until which the pair was predicted before.
@@ -59,14 +59,14 @@ def predict_pairs(multibody, pairs, now, query, events, scratch):
 
 
 @inlined
-def is_cheap(bodies, i, j):
+def is_cheap(bodies: Any, i: int, j: int) -> bool:
     """Whether an exact search costs no more than a bound: two spheres, or a half-space (it has no bounding sphere)."""
     spheres = bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0
     return spheres or not (isfinite(bodies.motion[i].radius) and isfinite(bodies.motion[j].radius))
 
 
 @inlined
-def bound_impact(bodies, i, j, window, margin, event):
+def bound_impact(bodies: Any, i: int, j: int, window: Window, margin: float, event: Any) -> None:
     """Write the first time in the window at which the pair's bounding spheres meet into the IMPACT record `event`.
 
     event.status = UNRESOLVED, or CLEAR if the spheres, and therefore the bodies, do not meet.
@@ -91,7 +91,7 @@ def bound_impact(bodies, i, j, window, margin, event):
 
 
 @kernel
-def bound_pairs(multibody, pairs, now, query, events, scratch):
+def bound_pairs(multibody: Any, pairs: Any, now: float, query: Any, events: Any, scratch: Any) -> tuple[int, int]:
     """As `predict_pairs`, but with `bound_impact` for all pairs that are not cheap."""
     bodies = multibody.bodies
     n = queries = 0
@@ -110,7 +110,7 @@ def bound_pairs(multibody, pairs, now, query, events, scratch):
 
 
 @kernel
-def refine(multibody, bounds, now, query, events, scratch):
+def refine(multibody: Any, bounds: Any, now: float, query: Any, events: Any, scratch: Any) -> tuple[int, int]:
     """Write the first impacts from `now` on of the pairs of `bounds` (IMPACT) into events; as `predict_pairs`."""
     n = queries = 0
     for k in range(bounds.size):

@@ -6,7 +6,7 @@ As in tree_impact.py, boxes wait in the order of the times until which they cert
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Final
+from typing import Any, Final
 
 from collision_monitor._jit import inlined, outlined
 from collision_monitor.geometry.vector import dot
@@ -41,14 +41,14 @@ than any limit."""
 
 
 @inlined
-def _farthest(blocks, block, k, solid):
+def _farthest(blocks: Any, block: int, k: int, solid: MovingSolid) -> float:
     """Bound on the distance of the solid from the farthest point of a box (m)."""
     center = place_point(inverse(solid.X), center_of(blocks, block, k))
     return point_distance_range(solid.table, solid.b, center)[1] + box_radius(blocks, block, k)
 
 
 @inlined
-def _times_of_members(blocks, block, solid, work):
+def _times_of_members(blocks: Any, block: int, solid: MovingSolid, work: Any) -> float:
     """Write to work[BOUNDS:] until when the boxes of a block stay apart from the solid (s); return the least."""
     soon = inf
     for m in range(WIDTH):
@@ -59,7 +59,9 @@ def _times_of_members(blocks, block, solid, work):
 
 
 @outlined
-def solid_impact(table, parts, pair, window, tube, query, ending, scratch):
+def solid_impact(
+    table: Any, parts: Any, pair: Any, window: Any, tube: Any, query: Any, ending: Any, scratch: Any
+) -> tuple[int, float, int, float]:
     """`tree_impact` of a tree and a solid, which may not be swapped: pair has both motions, then both slots."""
     A, B, a, b = pair
     begin, end = times_of(window)

@@ -6,6 +6,7 @@ from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.motion.motion import half_acceleration, relative_position, relative_velocity
 from collision_monitor.tolerances import EPSILON
 
@@ -21,13 +22,15 @@ class RelativeMotion(NamedTuple):
 
 
 @inlined
-def relative_motion_at(A, B, t):
+def relative_motion_at(A: Any, B: Any, t: float) -> RelativeMotion:
     """Approach of motion B to motion A (MOTION) at time t."""
     return RelativeMotion(relative_position(A, B, t), relative_velocity(A, B, t))
 
 
 @device
-def sphere_interval(d, v, reach, growth, end, outward):
+def sphere_interval(
+    d: Vector, v: Vector, reach: float, growth: float, end: float, outward: float
+) -> tuple[float, float]:
     """First and last time (s) in [0, end] at which |d + v t| <= reach + growth t; (inf, -inf): never. d, v: (3,).
 
     Rounded outward, so that the interval contains all these times (outward = 1), or inward, so that it contains only
@@ -53,7 +56,7 @@ def sphere_interval(d, v, reach, growth, end, outward):
 
 
 @inlined
-def _interval(d, v, reach, growth, end, outward):
+def _interval(d: Vector, v: Vector, reach: float, growth: float, end: float, outward: float) -> tuple[float, float]:
     dx, dy, dz = d
     vx, vy, vz = v
     e = outward * EPSILON
@@ -91,7 +94,7 @@ def _interval(d, v, reach, growth, end, outward):
 
 
 @inlined
-def meeting_of_spheres(A, B, approach, begin, t, event):
+def meeting_of_spheres(A: Any, B: Any, approach: RelativeMotion, begin: float, t: float, event: Any) -> None:
     """Write point, normal and closing speed of the contact of the bounding spheres of A and B, t (s) after begin.
 
     approach: of B to A at begin. event: the IMPACT record to write.

@@ -134,7 +134,7 @@ class _Ball(NamedTuple):
 
 
 @inlined
-def _ball(trees, at, m, R, rate, span):
+def _ball(trees: Trees, at: int, m: Any, R: Any, rate: float, span: float) -> _Ball:
     """Sphere `at` of a body in motion m (MOTION) with rotation R, which turns at `rate` (rad/s) for `span` (s).
 
     at = -1: the body's bounding sphere.
@@ -155,7 +155,7 @@ def _ball(trees, at, m, R, rate, span):
 
 
 @device
-def tree_meeting(bodies, trees, i, j, window, margin, rotation):
+def tree_meeting(bodies: Any, trees: Trees, i: int, j: int, window: Window, margin: float, rotation: Any) -> float:
     """Return a time (s after the window's begin) before which the trees of bodies i and j cannot meet; inf: never.
 
     The centres of the spheres move straight, with their velocity at the time when the bounding spheres meet. Their
@@ -215,7 +215,7 @@ def tree_meeting(bodies, trees, i, j, window, margin, rotation):
 
 
 @kernel
-def tighten(bodies, trees, events, now, margin, rotation):
+def tighten(bodies: Any, trees: Trees, events: Any, now: float, margin: float, rotation: Any) -> None:
     """Delay events (IMPACT) that are bounds by bounding spheres until the sphere trees meet.
 
     status = CLEAR if they do not meet before the cover times. rotation (2 or more, 3, 3): scratch.

@@ -75,7 +75,9 @@ def _turning(table: Any, s: int, R: Any, o: Vector, w: Vector, n: Vector) -> Vec
 
 
 @outlined
-def touching_impact(table, parts, pair, window, skin, apart, separation, scratch):
+def touching_impact(
+    table: Any, parts: Any, pair: Any, window: Any, skin: float, apart: float, separation: float, scratch: Any
+) -> tuple[int, float]:
     """What a pair of convex shapes (ShapePair) does that touches at the begin of the window, and when (s).
 
     Gaps count beyond the separation (m). skin (m): depth from which on it is an impact. apart (m): gap from which on

@@ -86,14 +86,14 @@ FULL: Final = SearchEnd(0.0, 0.0, 0.0)
 
 
 @inlined
-def ending_gap(ending, speed, t, query):
+def ending_gap(ending: SearchEnd, speed: float, t: float, query: Any) -> float:
     """Gap (m) at which a search ends at time t (s), for bodies of a relative speed (m/s)."""
     near = speed * max(SHARE * (t - ending.now), DUE * ending.period)
     return max(min(ending.tolerance, near), query.tolerance)
 
 
 @inlined
-def steps_of(A, B, duration, query, ending):
+def steps_of(A: Any, B: Any, duration: float, query: Any, ending: SearchEnd) -> int:
     """Most boxes that a search of a duration (s) examines. It knows then until when the bodies are apart."""
     if ending.tolerance > 0.0:
         return STEPS
@@ -101,14 +101,14 @@ def steps_of(A, B, duration, query, ending):
 
 
 @inlined
-def box_radius(blocks, block, member):
+def box_radius(blocks: Any, block: int, member: int) -> float:
     """Half of the diagonal of a box (m)."""
     x, y, z = blocks[block, HALF, member], blocks[block, HALF + 1, member], blocks[block, HALF + 2, member]
     return sqrt(x * x + y * y + z * z)
 
 
 @inlined
-def times_of(window):
+def times_of(window: Any) -> tuple[float, float]:
     """Begin and end of a search in a window (s). The end is later than the begin, so that an instant is examined too.
 
     Pairs of boxes wait only for times before the end. A window is an instant where the profile has no horizon.
@@ -118,7 +118,7 @@ def times_of(window):
 
 
 @device
-def push_pair(heap, count, t, place_a, place_b, pair):
+def push_pair(heap: Any, count: int, t: float, place_a: float, place_b: float, pair: float) -> int:
     """Add a pair of boxes to the heap, which begins at PAIRS; return its new length."""
     k = count
     while k > 0 and heap[PAIRS + ENTRY * ((k - 1) >> 1)] > t:
@@ -132,7 +132,7 @@ def push_pair(heap, count, t, place_a, place_b, pair):
 
 
 @device
-def pop_first(heap, count):
+def pop_first(heap: Any, count: int) -> int:
     """Remove the pair of boxes with the least time; return the new length."""
     count -= 1
     last = PAIRS + ENTRY * count
@@ -151,7 +151,9 @@ def pop_first(heap, count):
 
 
 @inlined
-def tree_approach_at(table, parts, pair, t, margin, growth, until, scratch):
+def tree_approach_at(
+    table: Any, parts: Any, pair: Any, t: float, margin: float, growth: float, until: float, scratch: Any
+) -> Any:
     """Position of shape b's origin relative to that of a in world axes (m), and the Approach of both in a's axes.
 
     Writes the rotations of the shapes to world axes into scratch.rotation[2] and [3]. margin: gap that counts as
@@ -189,7 +191,7 @@ def tree_approach_at(table, parts, pair, t, margin, growth, until, scratch):
 
 
 @inlined
-def spins(A, B, duration):
+def spins(A: Any, B: Any, duration: float) -> bool:
     """Whether two bodies turn too far within a duration (s): by MOST_TURNED, or with points that move MOST_SWEPT."""
     rate_a = sqrt(A.wx * A.wx + A.wy * A.wy + A.wz * A.wz)
     rate_b = sqrt(B.wx * B.wx + B.wy * B.wy + B.wz * B.wz)
@@ -199,7 +201,7 @@ def spins(A, B, duration):
 
 
 @inlined
-def open_box(blocks, box_a, box_b, X, move, work):
+def open_box(blocks: Any, box_a: Any, box_b: Any, X: Any, move: Approach, work: Any) -> tuple[bool, int, float, float]:
     """Open one of two boxes: write to work[BOUNDS:] until when its members stay apart from the other box (s).
 
     box_a, box_b: root of the tree, block, member and child of each. Returns whether it is B's box, the block of its
@@ -222,7 +224,9 @@ def open_box(blocks, box_a, box_b, X, move, work):
 
 
 @outlined
-def tree_impact(table, parts, pair, window, tube, query, ending, scratch):
+def tree_impact(
+    table: Any, parts: Any, pair: Any, window: Any, tube: Any, query: Any, ending: SearchEnd, scratch: Any
+) -> tuple[int, float, int, float]:
     """`shape_impact` of two shapes with trees; scratch.answer then has the places of the triangles that meet.
 
     A search that ends early (SearchEnd) ends, UNRESOLVED, as soon as two boxes are so small and so near that their

@@ -13,13 +13,14 @@ from numba.extending import intrinsic
 
 from collision_monitor._jit import device, inlined
 from collision_monitor._jit.lanes import Lanes, load_lanes, store
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.meshes.layout import AXES, CENTER, CORNERS, HALF, RADIUS, ROWS, WIDTH
 from collision_monitor.meshes.placing import Placing
 from collision_monitor.tolerances import SAT_ROUND_OFF
 
 
 @inlined
-def seen_from(blocks, block, member, X):
+def seen_from(blocks: Any, block: int, member: int, X: Placing) -> Placing:
     """Pose of another tree in the frame of a box; X: that pose in the frame of the box's own tree."""
     a00, a01, a02 = blocks[block, AXES, member], blocks[block, AXES + 1, member], blocks[block, AXES + 2, member]
     a10, a11, a12 = blocks[block, AXES + 3, member], blocks[block, AXES + 4, member], blocks[block, AXES + 5, member]
@@ -38,7 +39,7 @@ def seen_from(blocks, block, member, X):
 
 
 @inlined
-def half_of(blocks, block, member):
+def half_of(blocks: Any, block: int, member: int) -> Vector:
     """Half extents of a box (m)."""
     return blocks[block, HALF, member], blocks[block, HALF + 1, member], blocks[block, HALF + 2, member]
 
@@ -160,7 +161,7 @@ def _triangle_bounds(typing_context, half, M, blocks, block, out, at):
 
 
 @device
-def raise_by_gaps(blocks_a, a, member, blocks_b, b, X, out, at):
+def raise_by_gaps(blocks_a: Any, a: int, member: int, blocks_b: Any, b: int, X: Placing, out: Any, at: int) -> None:
     """Raise bounds on the squared distances of a box from the eight boxes of block b, out[at: at + 8], to those along
     the axes of either (m^2). Arguments as for `box_separations`.
     """
@@ -168,7 +169,7 @@ def raise_by_gaps(blocks_a, a, member, blocks_b, b, X, out, at):
 
 
 @device
-def box_separations(blocks_a, a, member, blocks_b, b, X, out, at):
+def box_separations(blocks_a: Any, a: int, member: int, blocks_b: Any, b: int, X: Placing, out: Any, at: int) -> None:
     """Write the largest gaps of a box and the eight boxes of block b along an axis of either to out[at: at + 8] (m).
 
     blocks_a, a, member: the box. X: pose of the tree of b in the frame of the box's tree. A gap above 0 separates them;
@@ -178,6 +179,6 @@ def box_separations(blocks_a, a, member, blocks_b, b, X, out, at):
 
 
 @device
-def triangle_bounds(blocks_a, a, member, blocks_b, b, X, out, at):
+def triangle_bounds(blocks_a: Any, a: int, member: int, blocks_b: Any, b: int, X: Placing, out: Any, at: int) -> None:
     """Write lower bounds on the squared distances of a box from the triangles of block b to out[at: at + 8] (m^2)."""
     _triangle_bounds(half_of(blocks_a, a, member), seen_from(blocks_a, a, member, X), blocks_b, b, out, at)

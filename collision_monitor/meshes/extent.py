@@ -51,7 +51,7 @@ def farthest(blocks: Any, root: int, d: Vector, work: Any) -> float:
 
 
 @kernel
-def _extents(tree, directions, out, work):
+def _extents(tree: Any, directions: Any, out: Any, work: Any) -> None:
     for k in range(len(directions)):
         out[k] = farthest(tree, 0, (directions[k, 0], directions[k, 1], directions[k, 2]), work)
 

@@ -217,7 +217,10 @@ class ActivePairs(Stage):
 
 
 @kernel
-def _unite(ids, used, version, pairs, events, carried, due, order, new_pairs, new_events, new_carried):
+def _unite(
+    ids: Any, used: Any, version: Any, pairs: Any, events: Any, carried: Any, due: Any, order: Any, new_pairs: Any,
+    new_events: Any, new_carried: Any,
+) -> int:  # fmt: skip
     """Merge the active pairs with those of the due events, by key, into new_pairs; their events into new_events.
 
     Those that touched take their carried rows along into new_carried, if both arrays have rows.
@@ -265,7 +268,7 @@ def _unite(ids, used, version, pairs, events, carried, due, order, new_pairs, ne
 
 
 @inlined
-def _ask_for_body(table, parts, bodies, i):
+def _ask_for_body(table: Any, parts: Any, bodies: Any, i: int) -> None:
     row, shape = np.intp(i), np.intp(bodies.first_shape[i])
     prefetch(bodies.position, row)
     prefetch(bodies.angular, row)  # the other half of LAST_STATE
@@ -280,7 +283,7 @@ def _ask_for_body(table, parts, bodies, i):
 
 
 @inlined
-def _ask_for(multibody, pairs, which, at):
+def _ask_for(multibody: Any, pairs: Any, which: Any, at: int) -> None:
     """Prefetch the data of the pairs that `_examine` visits after the pair at index `at` of `which`."""
     table, parts, bodies = multibody
     if at + 2 * PREFETCH_AHEAD < which.size:
@@ -298,7 +301,9 @@ def _ask_for(multibody, pairs, which, at):
 
 @direct
 @kernel
-def _examine(multibody, active, which, now, queries, scratch, later):
+def _examine(
+    multibody: Any, active: Active, which: Any, now: float, queries: Any, scratch: Scratch, later: Any
+) -> tuple[int, int, int]:
     """Examine the active pairs `which` (M,) at `now`: write contacts into the results, predict the other pairs further.
 
     The pairs keep their indices. A pair that does not touch and is certified apart for a while returns to the event
@@ -358,7 +363,7 @@ def _examine(multibody, active, which, now, queries, scratch, later):
 
 
 @inlined
-def _can_wait(bodies, event, now, period):
+def _can_wait(bodies: Any, event: Any, now: float, period: float) -> bool:
     """Whether a pair of bounded meshes is only tested: it certainly meets soon, or was found to be near just before."""
     if not holds(bodies.version, event):
         return False
@@ -368,7 +373,7 @@ def _can_wait(bodies, event, now, period):
 
 
 @inlined
-def is_predicted_anew(bodies, i, j, now, event):
+def is_predicted_anew(bodies: Any, i: int, j: int, now: float, event: Any) -> bool:
     """Whether this step predicted the pair anew already, because a body left the motion that the event rests on."""
     is_new = bodies.motion[i].time == now or bodies.motion[j].time == now
     return is_new and not holds(bodies.version, event)

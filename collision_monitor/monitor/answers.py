@@ -167,7 +167,7 @@ def step_status(
 
 
 @kernel
-def mark_overtaken(predictions, age):
+def mark_overtaken(predictions: Any, age: float) -> int:
     """Make the certain predictions UNRESOLVED whose collisions have begun by now, if the states are `age` (s) old.
 
     Returns their number.
@@ -181,7 +181,7 @@ def mark_overtaken(predictions, age):
 
 
 @kernel
-def count_answers(pairs, contacts, predictions):
+def count_answers(pairs: Any, contacts: Any, predictions: Any) -> tuple[int, int]:
     """Count the pairs (PAIR) that touch, and the contacts and predictions that are UNRESOLVED."""
     touching = unresolved = 0
     for k in range(pairs.size):
@@ -194,7 +194,7 @@ def count_answers(pairs, contacts, predictions):
 
 
 @inlined
-def _leave_out_details(contact):
+def _leave_out_details(contact: Any) -> None:
     for c in range(3):
         contact.point_a[c] = contact.point_b[c] = nan
     contact.closing_speed = nan
@@ -211,7 +211,7 @@ class StaleLimits(NamedTuple):
 
 
 @inlined
-def _is_in_doubt(bodies, i, j, distance, limits):
+def _is_in_doubt(bodies: Any, i: int, j: int, distance: float, limits: StaleLimits) -> bool:
     """Whether a pair may be farther apart than the margin, because one of its bodies is stale."""
     age_i, age_j = age_of(bodies, i, limits.now), age_of(bodies, j, limits.now)
     if not (age_i > limits.stale_after or age_j > limits.stale_after):
@@ -221,7 +221,9 @@ def _is_in_doubt(bodies, i, j, distance, limits):
 
 
 @kernel
-def write_contacts(pairs, results, bodies, shape_index, limits, has_details, contacts):
+def write_contacts(
+    pairs: Any, results: Any, bodies: Any, shape_index: Any, limits: StaleLimits, has_details: bool, contacts: Any
+) -> int:
     """Write the contacts (records.CONTACT) of the pairs that touch or have just ended; return their number.
 
     results (n, RESULT): of the pairs. shape_index (S,): a shape's place in its object's description. limits:
@@ -283,7 +285,9 @@ class Times(NamedTuple):
 
 @direct
 @kernel
-def write_predictions(predicted, bodies, shape_index, times, predictions, slots):
+def write_predictions(
+    predicted: Predicted, bodies: Any, shape_index: Any, times: Times, predictions: Any, slots: Any
+) -> int:
     """Write the predictions (records.PREDICTION) of the active pairs that do not touch, then of the pending events.
 
     shape_index (S,): a shape's place in its object's description. slots (n, 2), written: body slots of each prediction.
@@ -335,7 +339,7 @@ def write_predictions(predicted, bodies, shape_index, times, predictions, slots)
 
 
 @kernel
-def chain_digest(digest, words):
+def chain_digest(digest: Any, words: Any) -> Any:
     """64-bit digest of `digest` followed by words (n,) uint64; four independent lanes, mixed at the end.
 
     It distinguishes equal answers from unequal ones. It is not meant to resist forgery.

@@ -133,7 +133,7 @@ def is_checked(roster: Roster, i: int, others: NDArray[np.int32]) -> NDArray[np.
 
 
 @device
-def _allowed(allowed, id_a, id_b):
+def _allowed(allowed: Any, id_a: int, id_b: int) -> bool:
     """Whether the pair is in the sorted keys (smaller id << 32 | larger id)."""
     if allowed.size == 0:
         return False
@@ -151,7 +151,7 @@ class GridSearch(NamedTuple):
 
 
 @inlined
-def _finds(bodies, is_new, i, j):
+def _finds(bodies: BodyTable, is_new: Any, i: int, j: int) -> bool:
     """Whether body i of a pair with overlapping boxes is the one that reports it, so that each pair is found once.
 
     Body i must start anew or be predicted further. If both bodies do, the one that was predicted less far reports the
@@ -169,7 +169,7 @@ def _finds(bodies, is_new, i, j):
 
 @direct
 @kernel
-def find_partners(bodies, boxes, search, now, margin, pairs):
+def find_partners(bodies: Any, boxes: Any, search: Any, now: Any, margin: Any, pairs: Any) -> Any:
     """Write the pairs of each body of the search with all bodies whose swept box overlaps its own, each pair once.
 
     A body that is predicted further needs only the box that it sweeps after the time until which it was predicted
@@ -199,7 +199,7 @@ def find_partners(bodies, boxes, search, now, margin, pairs):
 
 
 @device
-def _reporter(bodies, box, i, j, is_new, now, margin):
+def _reporter(bodies: BodyTable, box: Any, i: int, j: int, is_new: Any, now: float, margin: float) -> int:
     """The body of a pair with overlapping boxes that reports it in `find_partners`; -1: neither."""
     if not _finds(bodies, is_new, i, j):
         i, j = j, i
@@ -215,7 +215,7 @@ def _reporter(bodies, box, i, j, is_new, now, margin):
 
 @direct
 @kernel
-def sweep(bodies, box, search, top, now, margin, pairs):
+def sweep(bodies: BodyTable, box: Any, search: GridSearch, top: int, now: float, margin: float, pairs: Any) -> int:
     """As `find_partners`, but by a test of each body of the search with all bodies in the first `top` slots.
 
     box (N,): GRID_BOX. If there are few bodies, this is faster than a grid.
@@ -237,7 +237,7 @@ def sweep(bodies, box, search, top, now, margin, pairs):
 
 @direct
 @kernel
-def keep_new(bodies, box, pairs, is_new, now, margin):
+def keep_new(bodies: BodyTable, box: Any, pairs: Any, is_new: Any, now: float, margin: float) -> int:
     """Move the pairs (P, 2) that `find_partners` would find to the front; return their number.
 
     The pairs are those of overlapping boxes with at least one new body, found by one sweep over all boxes. If many
@@ -259,7 +259,7 @@ def keep_new(bodies, box, pairs, is_new, now, margin):
 
 
 @kernel
-def keep_checked(static, group, mask, ids, allowed, pairs):
+def keep_checked(static: Any, group: Any, mask: Any, ids: Any, allowed: Any, pairs: Any) -> int:
     """Move the pairs (P, 2) that are checked to the front; return their number.
 
     Pairs of two static bodies, pairs whose groups ignore each other and allowed pairs are not checked.

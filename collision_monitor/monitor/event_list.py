@@ -10,7 +10,7 @@ Source: lecture slides "List of collisions": ordered on time, only the first has
 from __future__ import annotations
 
 from math import inf
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,12 +29,12 @@ NO_EVENTS: Final = np.zeros(0, IMPACT)
 
 
 @device
-def _before(a, b):
+def _before(a: Any, b: Any) -> bool:
     return a.lower < b.lower or (a.lower == b.lower and a.key < b.key)
 
 
 @kernel
-def sort_order(events, order, spare):
+def sort_order(events: Any, order: Any, spare: Any) -> None:
     """Write the order of events by (lower, key) into order (n,) int64: merge sort of runs sorted by insertion.
 
     spare (n,) int64: scratch.
@@ -67,7 +67,7 @@ def sort_order(events, order, spare):
 
 
 @kernel
-def count_until(events, time):
+def count_until(events: Any, time: float) -> int:
     """Count the events with `lower` <= time (s) in a sorted array: they are at its front."""
     low, high = 0, events.size
     while low < high:
@@ -80,7 +80,7 @@ def count_until(events, time):
 
 
 @kernel
-def take_due(events, version, now, due):
+def take_due(events: Any, version: Any, now: float, due: Any) -> tuple[int, int]:
     """Write the events that are due by `now` and still hold into `due`. Returns (number due, number written)."""
     passed = n = 0
     while passed < events.size and events[passed].lower <= now:
@@ -92,7 +92,7 @@ def take_due(events, version, now, due):
 
 
 @kernel
-def merge(old, new, order, version, merged):
+def merge(old: Any, new: Any, order: Any, version: Any, merged: Any) -> int:
     """Merge `old`, sorted, and `new`, sorted by `order`. Drop events of `old` that do not hold. Return the length."""
     i = k = n = 0
     while i < old.size or k < new.size:
@@ -110,12 +110,12 @@ def merge(old, new, order, version, merged):
 
 
 @inlined
-def _hash(key, mask):
+def _hash(key: Any, mask: Any) -> Any:
     return np.int64(((key * np.uint64(0x9E3779B97F4A7C15)) >> np.uint64(32)) & np.uint64(mask))
 
 
 @device
-def _place(key, new, place):
+def _place(key: int, new: Any, place: Any) -> int:
     """Position of the key, or of the free slot for it, in the hash table `place` of indices into `new`.
 
     Its size is a power of two; -1: free.
@@ -129,7 +129,7 @@ def _place(key, new, place):
 
 @direct
 @kernel
-def keep_first(new, bodies, pending, pairs, room, keep):
+def keep_first(new: Any, bodies: BodyTable, pending: Any, pairs: Any, room: Any, keep: Any) -> int:
     """`EventList.first_of_pairs`; returns their number. room (R,) int32: a hash table. keep (n,) bool: all True."""
     later = 0
     for k in range(new.size):
@@ -168,7 +168,7 @@ def keep_first(new, bodies, pending, pairs, room, keep):
 
 
 @inlined
-def _was_predicted(event, bodies):
+def _was_predicted(event: Any, bodies: BodyTable) -> bool:
     """Whether its pair was predicted before this step, by motions that still hold."""
     return min(bodies.motion[event.i].covered, bodies.motion[event.j].covered) > -inf
 

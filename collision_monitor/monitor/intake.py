@@ -271,7 +271,9 @@ def _states(ids: NDArray[Any], poses: Any, twists: Any) -> States:
 
 @direct
 @kernel
-def take_states(bodies, slots, numbers, flags, time, rates, verdicts):
+def take_states(
+    bodies: Any, slots: Any, numbers: Any, flags: Any, time: float, rates: Any, verdicts: Any
+) -> tuple[int, bool]:
     """Store states as the bodies' last ones.
 
     slots (M,) int32, -1: unknown id. numbers (M, 21) float64: the rows of records.STATE; where the twist is estimated,
@@ -295,14 +297,14 @@ def take_states(bodies, slots, numbers, flags, time, rates, verdicts):
 
 
 @inlined
-def _norm(numbers, k):
+def _norm(numbers: Any, k: int) -> float:
     """Length of the quaternion in row k."""
     x, y, z, w = numbers[k, 3], numbers[k, 4], numbers[k, 5], numbers[k, 6]
     return sqrt(x * x + y * y + z * z + w * w)
 
 
 @inlined
-def _verdict(bodies, i, numbers, k, flags, time, rates):
+def _verdict(bodies: Any, i: int, numbers: Any, k: int, flags: int, time: float, rates: Any) -> int:
     """What becomes of the state in row k, of body i: ACCEPTED, LEFT_OUT or the reason of the refusal."""
     if i < 0:
         return UNKNOWN_ID
@@ -324,7 +326,7 @@ def _verdict(bodies, i, numbers, k, flags, time, rates):
 
 
 @inlined
-def _store(bodies, i, numbers, k, flags, time):
+def _store(bodies: Any, i: int, numbers: Any, k: int, flags: int, time: float) -> None:
     """Make the state in row k the last one of body i."""
     accelerates = (flags & _ACCELERATION_VALID) != 0
     norm = _norm(numbers, k)
@@ -355,7 +357,7 @@ def _store(bodies, i, numbers, k, flags, time):
 
 
 @device
-def _estimate_twist(bodies, i, position, quaternion, elapsed):
+def _estimate_twist(bodies: Any, i: int, position: Any, quaternion: Any, elapsed: float) -> None:
     """Estimate the twist from the last pose: difference of positions, logarithm of the relative rotation."""
     x, y, z, w = quaternion
     for c in range(3):

@@ -7,6 +7,7 @@ Approximating polyhedra with spheres for time-critical collision detection, 1996
 from __future__ import annotations
 
 from math import sqrt
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -200,7 +201,7 @@ class TimeCritical(Stage):
 
 
 @kernel
-def leave(bodies, active, which, now, query, later):
+def leave(bodies: BodyTable, active: Any, which: Any, now: float, query: Any, later: Any) -> int:
     """Bound the active pairs `which` (M,) that this step does not examine; counterpart of `ActivePairs.examine`.
 
     A pair that touched stays a contact, UNRESOLVED, with the distance of the centres and an error bound that holds for
@@ -241,7 +242,7 @@ _WAIT = np.dtype([("lower", np.float64), ("key", np.uint64)])
 
 
 @kernel
-def _by_turns(bodies, pairs, events, step, waits, order, turns):
+def _by_turns(bodies: Any, pairs: Any, events: Any, step: Any, waits: Any, order: Any, turns: Any) -> Any:
     """`urgency`, into turns (n,) int64. waits (n,) _WAIT, order (n,) int64: scratch. Returns how many are cheap."""
     for k in range(pairs.size):
         waits[k].lower = events[k].lower

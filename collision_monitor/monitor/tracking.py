@@ -149,7 +149,7 @@ class Tracking(Stage):
 
 
 @device
-def _turned_away(bodies, start, count, columns, angles):
+def _turned_away(bodies: Any, start: int, count: int, columns: Any, angles: Any) -> None:
     """`turned_away`, skipped if rotation moves none of the bodies."""
     turns = False
     for i in range(start, start + count):
@@ -160,7 +160,9 @@ def _turned_away(bodies, start, count, columns, angles):
 
 @direct
 @kernel
-def find_moved(bodies, uncertainty, count, seconds, settings, columns, found):
+def find_moved(
+    bodies: Any, uncertainty: Uncertainty, count: int, seconds: Any, settings: Any, columns: Any, found: Any
+) -> tuple[int, int, int]:
     """Find the bodies among the first `count` slots whose predictions no longer hold at `now`, or end too soon.
 
     The slots of the former are written into found[0], those of the latter, which end within the horizon, into found[1];
@@ -204,7 +206,9 @@ def find_moved(bodies, uncertainty, count, seconds, settings, columns, found):
 
 
 @inlined
-def _deviation(bodies, i, now, horizon, stale_acceleration, angle):
+def _deviation(
+    bodies: Any, i: int, now: float, horizon: float, stale_acceleration: float, angle: float
+) -> tuple[float, float]:
     """How far (m) the surface of body i is from its reference motion, and how fast (m/s) it drifts from it, at most.
 
     angle: by which the body's last orientation is turned from that of its reference motion (rad). If the origin alone
@@ -241,7 +245,7 @@ def _deviation(bodies, i, now, horizon, stale_acceleration, angle):
 
 
 @device
-def _is_wide_without_need(bodies, i, age, settings):
+def _is_wide_without_need(bodies: Any, i: int, age: float, settings: Any) -> bool:
     """Whether body i was stale when its motion started, and is not stale now.
 
     A tube as wide as a long silence required would hold for ever, and with it UNRESOLVED pairs. Tubes of shorter
@@ -253,14 +257,16 @@ def _is_wide_without_need(bodies, i, age, settings):
 
 
 @kernel
-def remember_cover(motion, which):
+def remember_cover(motion: Any, which: Any) -> None:
     """Record that the bodies `which` (M,) have been predicted until their cover times, by this motion (MOTION)."""
     for i in which:
         motion[i].covered = motion[i].cover
 
 
 @device
-def _is_covered(bodies, uncertainty, i, now, horizon, stale_acceleration):
+def _is_covered(
+    bodies: Any, uncertainty: Uncertainty, i: int, now: float, horizon: float, stale_acceleration: float
+) -> bool:
     """Whether the box of body i is wide enough for its uncertainty."""
     spread, sigmas = uncertainty
     m = bodies.motion[i]
@@ -271,7 +277,9 @@ def _is_covered(bodies, uncertainty, i, now, horizon, stale_acceleration):
 
 
 @device
-def _cover_spread(bodies, uncertainty, i, now, most, stale_acceleration):
+def _cover_spread(
+    bodies: Any, uncertainty: Uncertainty, i: int, now: float, most: Any, stale_acceleration: float
+) -> None:
     """Widen the box of body i for its uncertainty from now until its cover time, by at most most[0] + most[1] t (m).
 
     This suffices until the age of its last state has doubled, and for states that are a little less certain.
@@ -286,7 +294,7 @@ def _cover_spread(bodies, uncertainty, i, now, most, stale_acceleration):
 
 
 @device
-def _cover(bodies, i, now, horizon):
+def _cover(bodies: Any, i: int, now: float, horizon: float) -> None:
     """Set the cover time of body i: the end of the horizon and a share of its slack.
 
     The later stages predict only what lies after `covered`. The share depends on the body's slot and the time, so that
@@ -308,7 +316,10 @@ def _cover(bodies, i, now, horizon):
 
 @direct
 @kernel
-def renew_motions(bodies, uncertainty, grid, moved, ending, seconds, limits, settings, width):
+def renew_motions(
+    bodies: Any, uncertainty: Uncertainty, grid: HashedGrid, moved: Any, ending: Any, seconds: Any, limits: Any,
+    settings: Any, width: Any,
+) -> None:  # fmt: skip
     """`restart_motion` of the bodies `moved` (M,), then `continue_motion` of those in `ending`.
 
     seconds: now, and the horizon of each body (N,).
@@ -318,7 +329,10 @@ def renew_motions(bodies, uncertainty, grid, moved, ending, seconds, limits, set
 
 
 @device
-def restart_motion(bodies, uncertainty, grid, which, seconds, limits, settings, width):
+def restart_motion(
+    bodies: Any, uncertainty: Uncertainty, grid: HashedGrid, which: Any, seconds: Any, limits: Any, settings: Any,
+    width: Any,
+) -> None:  # fmt: skip
     """Make the last state of each body in `which` (M,) its reference motion, and put its swept box into the grid.
 
     The version of the body changes, so that its pairs leave the event list. A stale object widens its bounds here: its
@@ -360,7 +374,9 @@ def restart_motion(bodies, uncertainty, grid, which, seconds, limits, settings, 
 
 
 @device
-def continue_motion(bodies, uncertainty, grid, which, seconds, settings, width):
+def continue_motion(
+    bodies: Any, uncertainty: Uncertainty, grid: HashedGrid, which: Any, seconds: Any, settings: Any, width: Any
+) -> None:
     """Predict each body in `which` (M,), which kept its reference motion, further; put its swept box into the grid.
 
     The body is known to be within tube_0 of its reference at `now`, so its tube widens from `now` on. Its next motion

@@ -86,7 +86,7 @@ def make_workspaces(samples: int) -> Workspaces:
 
 
 @kernel
-def renew(entries, pairs, bodies, spread, now, renewed):
+def renew(entries: Any, pairs: Any, bodies: Any, spread: Spread, now: float, renewed: Any) -> int:
     """Write the entries that still hold, then those of the pairs (P, 2) in which a body may be uncertain, into renewed.
 
     A pair also counts if a body's box is wide enough for uncertainty, because a body that declares some later within

@@ -9,6 +9,7 @@ import numpy as np
 
 from collision_monitor._jit import inlined
 from collision_monitor._jit.alignment import columns_in_one_block
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.motion.motion import MOTION
 
 LAST_STATE: Final = np.dtype(
@@ -105,7 +106,7 @@ def enlarge(source: NamedTuple, target: NamedTuple) -> None:
 
 
 @inlined
-def place_shape(table, parts, s, R_body, R_shape):
+def place_shape(table: Any, parts: Parts, s: int, R_body: Any, R_shape: Any) -> Vector:
     """Write the rotation of shape s of a body with rotation R_body into R_shape; return its offset from the body (m).
 
     Both are in world axes.
@@ -131,7 +132,7 @@ def place_shape(table, parts, s, R_body, R_shape):
 
 
 @inlined
-def next_pair(parts, first_b, a, b):
+def next_pair(parts: Parts, first_b: int, a: int, b: int) -> tuple[int, int]:
     """The pair of shapes after (a, b) of two bodies, in the order of both chains; a is -1 after the last pair.
 
     first_b: first shape of the second body. A loop over all pairs of shapes:
@@ -150,7 +151,7 @@ def next_pair(parts, first_b, a, b):
 
 
 @inlined
-def chain_radius(table, parts, first):
+def chain_radius(table: Any, parts: Parts, first: int) -> float:
     """Radius (m) of a sphere about the origin of a chain of shapes that contains them."""
     s, radius = first, 0.0
     while s >= 0:

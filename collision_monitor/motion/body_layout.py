@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from math import sqrt
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ def lay_out_body(multibody: Multibody, i: int, slots: Sequence[int], shape_of: S
 
 
 @kernel
-def _lay_out(multibody, i, slots, shape_of):
+def _lay_out(multibody: Multibody, i: int, slots: Any, shape_of: Any) -> None:
     table, parts, bodies = multibody
     last = slots.size - 1
     radius = -np.inf
@@ -42,7 +43,7 @@ def _lay_out(multibody, i, slots, shape_of):
 
 
 @inlined
-def _is_turned(rotation):
+def _is_turned(rotation: Any) -> bool:
     for a in range(3):
         for b in range(3):
             if rotation[a, b] != (1.0 if a == b else 0.0):
@@ -51,7 +52,7 @@ def _is_turned(rotation):
 
 
 @inlined
-def _is_revolved(table, s):
+def _is_revolved(table: Any, s: int) -> bool:
     """Whether a shape is a solid of revolution about an axis parallel to the z axis of its body."""
     kind = table.kind[s]
     along = abs(table.local_rotation[s, 2, 2]) == 1.0
@@ -59,7 +60,7 @@ def _is_revolved(table, s):
 
 
 @kernel
-def note_plain(multibody, which):
+def note_plain(multibody: Multibody, which: Any) -> None:
     """Note which of the bodies `which` (M,) are plain: one ball or one box without margin, and the object itself.
 
     A contact of two such bodies then reads one number of each, where it would read five columns to find that out.

@@ -7,11 +7,13 @@ that holds, the predictions made from the reference motion hold too. The tube of
 from __future__ import annotations
 
 from math import sqrt
+from typing import Any
 
 import numpy as np
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.broad_phase.region import Region
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.motion.trigonometry import sin_cos
 
 MOTION = np.dtype(
@@ -44,7 +46,7 @@ MOTION = np.dtype(
 
 
 @inlined
-def quaternion_to_matrix(q, i, out):
+def quaternion_to_matrix(q: Any, i: int, out: Any) -> None:
     """Write the rotation matrix of the unit quaternion q[i] (x, y, z, w) into out (3, 3)."""
     x, y, z, w = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
     out[0, 0] = 1.0 - 2.0 * (y * y + z * z)
@@ -59,7 +61,7 @@ def quaternion_to_matrix(q, i, out):
 
 
 @inlined
-def rotation_at(m, t, out):
+def rotation_at(m: Any, t: float, out: Any) -> None:
     """Write the rotation of the motion m (MOTION) at time t, exp((t - m.time) [w]x) R, into out (3, 3) (Rodrigues)."""
     R = m.rotation
     rate = sqrt(m.wx * m.wx + m.wy * m.wy + m.wz * m.wz)
@@ -82,7 +84,7 @@ def rotation_at(m, t, out):
 
 
 @inlined
-def relative_position(A, B, t):
+def relative_position(A: Any, B: Any, t: float) -> Vector:
     """Position of motion B relative to motion A at time t (m). Positions are subtracted first, against round-off."""
     ta, tb = t - A.time, t - B.time
     sa, sb = 0.5 * ta * ta, 0.5 * tb * tb
@@ -94,7 +96,7 @@ def relative_position(A, B, t):
 
 
 @inlined
-def relative_velocity(A, B, t):
+def relative_velocity(A: Any, B: Any, t: float) -> Vector:
     """Velocity of motion B relative to motion A at time t (m/s)."""
     ta, tb = t - A.time, t - B.time
     return (
@@ -105,20 +107,20 @@ def relative_velocity(A, B, t):
 
 
 @inlined
-def half_acceleration(A, B):
+def half_acceleration(A: Any, B: Any) -> float:
     """Half the magnitude of the acceleration of motion B relative to motion A (m/s^2)."""
     x, y, z = B.ax - A.ax, B.ay - A.ay, B.az - A.az
     return 0.5 * sqrt(x * x + y * y + z * z)
 
 
 @inlined
-def position_now(bodies, i, age, c):
+def position_now(bodies: Any, i: int, age: float, c: int) -> float:
     """Coordinate c of body i's origin `age` seconds after its last state (m)."""
     return bodies.position[i, c] + (bodies.linear[i, c] * age + 0.5 * bodies.acceleration[i, c] * age * age)
 
 
 @inlined
-def relative_position_now(bodies, i, age_i, j, age_j, c):
+def relative_position_now(bodies: Any, i: int, age_i: float, j: int, age_j: float, c: int) -> float:
     """Coordinate c of body j's origin relative to body i's (m), each extrapolated by the age (s) of its last state."""
     moved = bodies.linear[j, c] * age_j - bodies.linear[i, c] * age_i
     bent = 0.5 * bodies.acceleration[j, c] * age_j * age_j - 0.5 * bodies.acceleration[i, c] * age_i * age_i
@@ -126,7 +128,7 @@ def relative_position_now(bodies, i, age_i, j, age_j, c):
 
 
 @inlined
-def relative_velocity_now(bodies, i, age_i, j, age_j, c):
+def relative_velocity_now(bodies: Any, i: int, age_i: float, j: int, age_j: float, c: int) -> float:
     """Coordinate c of the velocity (m/s) of body j's origin relative to body i's."""
     return (
         bodies.linear[j, c]
@@ -136,7 +138,7 @@ def relative_velocity_now(bodies, i, age_i, j, age_j, c):
 
 
 @device
-def turn_quaternion(q, i, wx, wy, wz, t, out):
+def turn_quaternion(q: Any, i: int, wx: float, wy: float, wz: float, t: float, out: Any) -> None:
     """Write the orientation q[i] after t (s) at angular velocity w (rad/s, world frame) into out (4,)."""
     x, y, z, w = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
     rate = sqrt(wx * wx + wy * wy + wz * wz)
@@ -153,7 +155,7 @@ def turn_quaternion(q, i, wx, wy, wz, t, out):
 
 
 @inlined
-def chord_angle(ax, ay, az, aw, bx, by, bz, bw):
+def chord_angle(ax: float, ay: float, az: float, aw: float, bx: float, by: float, bz: float, bw: float) -> float:
     """Upper bound on the angle (rad) between two unit quaternions; exact to second order for small angles."""
     dot = ax * bx + ay * by + az * bz + aw * bw
     sign = 1.0 if dot >= 0.0 else -1.0
@@ -163,13 +165,13 @@ def chord_angle(ax, ay, az, aw, bx, by, bz, bw):
 
 
 @inlined
-def age_of(bodies, i, now):
+def age_of(bodies: Any, i: int, now: float) -> float:
     """Seconds since the last state of body i; 0 for a static one."""
     return 0.0 if bodies.static[i] else now - bodies.time[i]
 
 
 @device
-def rotation_now(bodies, i, now, q, R):
+def rotation_now(bodies: Any, i: int, now: float, q: Any, R: Any) -> None:
     """Write the rotation of body i at `now`, extrapolated from its last state, into R (3, 3); q (1, 4): scratch."""
     wx, wy, wz = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
     turn_quaternion(bodies.quaternion, i, wx, wy, wz, age_of(bodies, i, now), q[0])
@@ -177,7 +179,7 @@ def rotation_now(bodies, i, now, q, R):
 
 
 @device
-def swept_box(bodies, i, begin, margin):
+def swept_box(bodies: Any, i: int, begin: float, margin: float) -> Region:
     """Box that contains body i, its tube and spread, and `margin` (m), from `begin` until its cover time."""
     m = bodies.motion[i]
     sweep = 0.0 if bodies.static[i] else m.cover - begin
@@ -198,7 +200,7 @@ def swept_box(bodies, i, begin, margin):
 
 
 @device
-def carry_on(bodies, i, now, q, m):
+def carry_on(bodies: Any, i: int, now: float, q: Any, m: Any) -> float:
     """Write body i's last state, extrapolated to `now`, as the motion m (MOTION) with time 0 = now. Return its age."""
     age = 0.0 if bodies.static[i] else now - bodies.time[i]
     m.ax, m.ay, m.az = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]

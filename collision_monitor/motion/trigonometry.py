@@ -25,7 +25,7 @@ LARGEST: Final = 1e6
 
 
 @inlined
-def sin_cos(x):
+def sin_cos(x: float) -> tuple[float, float]:
     """Sine and cosine of x (rad), within 2 units in the last place of 1.
 
     Reduced to |r| <= pi / 4 by Cody and Waite's method, then Taylor's series up to r^18: its rest is below 1e-19.
@@ -36,7 +36,7 @@ def sin_cos(x):
 
 
 @inlined
-def sin_cos_within(x):
+def sin_cos_within(x: float) -> tuple[float, float]:
     """`sin_cos` for |x| < LARGEST, without branches, so that a compiler can vectorise a loop over many x."""
     k = np.rint(x * TWO_OVER_PI)
     r = ((x - k * HALF_PI_1) - k * HALF_PI_2) - k * HALF_PI_3

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +27,7 @@ def make_columns() -> NDArray[np.float64]:
 
 
 @device
-def turned_away(bodies, start, count, columns, angles):
+def turned_away(bodies: Any, start: int, count: int, columns: Any, angles: Any) -> None:
     """Write upper bounds on the angles (rad) between bodies' last states and their references at that time into angles.
 
     For `count` <= BLOCK bodies from slot `start` on; columns (COLUMNS, BLOCK): scratch. inf: the reference has turned

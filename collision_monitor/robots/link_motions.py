@@ -7,6 +7,7 @@ of its joint. Here each twist refers to the origin of its link, along the axes o
 from __future__ import annotations
 
 from math import cos, sin
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +41,10 @@ def load_link_motions() -> None:
 
 
 @kernel
-def _link_motions(parent, kind, position, quaternion, axis, variable, multiplier, offset, joints, poses, twists):
+def _link_motions(
+    parent: Any, kind: Any, position: Any, quaternion: Any, axis: Any, variable: Any, multiplier: Any, offset: Any,
+    joints: Any, poses: Any, twists: Any,
+) -> Any:  # fmt: skip
     for n in range(len(poses)):
         for i in range(1, len(parent)):
             above, pose, twist = poses[n, parent[i]], poses[n, i], twists[n, i]
@@ -70,7 +74,7 @@ def _link_motions(parent, kind, position, quaternion, axis, variable, multiplier
 
 
 @device
-def _turn(q, x, y, z, w, out):
+def _turn(q: Any, x: Any, y: Any, z: Any, w: Any, out: Any) -> Any:
     """Hamilton product of q and (x, y, z, w): that rotation first, then q. `out` may be q."""
     a, b, c, d = q[0], q[1], q[2], q[3]
     out[0] = d * x + a * w + b * z - c * y
@@ -80,7 +84,7 @@ def _turn(q, x, y, z, w, out):
 
 
 @device
-def _rotated(q, x, y, z):
+def _rotated(q: Any, x: Any, y: Any, z: Any) -> Any:
     """Vector (x, y, z) turned by a unit quaternion: v + 2 w (q x v) + 2 q x (q x v)."""
     a, b, c = 2.0 * (q[1] * z - q[2] * y), 2.0 * (q[2] * x - q[0] * z), 2.0 * (q[0] * y - q[1] * x)
     return (
@@ -91,7 +95,7 @@ def _rotated(q, x, y, z):
 
 
 @device
-def _carry(twist, dx, dy, dz, out):
+def _carry(twist: Any, dx: Any, dy: Any, dz: Any, out: Any) -> Any:
     """Twist of a rigid body at the point (dx, dy, dz) from where `twist` refers to."""
     out[0] = twist[0] + twist[4] * dz - twist[5] * dy
     out[1] = twist[1] + twist[5] * dx - twist[3] * dz

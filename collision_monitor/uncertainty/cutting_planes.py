@@ -12,6 +12,7 @@ from typing import Any, Final, NamedTuple
 from numpy import float32
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.narrow_phase.gjk import Accuracy
 from collision_monitor.uncertainty.flat_sides import has_side
 from collision_monitor.uncertainty.obstacle_planes import (
@@ -74,19 +75,19 @@ class CutSettings(NamedTuple):
 
 
 @inlined
-def plane_margin(settings):
+def plane_margin(settings: CutSettings) -> float:
     """Gap (m) at which a sample is behind a plane. Between planes the obstacle is farther by up to a tolerance."""
     return settings.margin - 0.5 * settings.tolerance
 
 
 @inlined
-def _part(settings, t):
+def _part(settings: CutSettings, t: float) -> float:
     """Factor of the tolerances at time t."""
     return min(settings.fineness[0] + settings.fineness[1] * t, 1.0)
 
 
 @inlined
-def _briefest(entry, leave, checked, first, last, inside):
+def _briefest(entry: Any, leave: Any, checked: Any, first: int, last: int, inside: Any) -> int:
     """Sample of first:last that enters, is not checked, and leaves soonest; -1: none. inside (S,): scratch."""
     entry, leave, checked, inside = entry[first:last], leave[first:last], checked[first:last], inside[first:last]
     for n in range(inside.size):  # without branches, see sample_gaps.py
@@ -100,7 +101,7 @@ def _briefest(entry, leave, checked, first, last, inside):
 
 
 @inlined
-def _entering(entry, leave, checked, first, last):
+def _entering(entry: Any, leave: Any, checked: Any, first: int, last: int) -> int:
     """First sample of first:last that enters and is not checked; -1: none."""
     entry, leave, checked = entry[first:last], leave[first:last], checked[first:last]
     for n in range(entry.size):
@@ -110,7 +111,7 @@ def _entering(entry, leave, checked, first, last):
 
 
 @inlined
-def _sole_mode(table, pair, n, settings, obstacle):
+def _sole_mode(table: Any, pair: Any, n: Vector, settings: CutSettings, obstacle: Any) -> int:
     """Mode of a plane along n (3,) where obstacle.placed has the shapes; NO_MODE: any, both have a side along it.
 
     A plane along a side of a body that does not turn is at rest. If it turned with the other body, and that with the
@@ -126,7 +127,7 @@ def _sole_mode(table, pair, n, settings, obstacle):
 
 
 @inlined
-def _copy(entry, leave, to_entry, to_leave, first, last):
+def _copy(entry: Any, leave: Any, to_entry: Any, to_leave: Any, first: int, last: int) -> None:
     """Copy the intervals of samples first:last."""
     entry, leave, to_entry, to_leave = entry[first:last], leave[first:last], to_entry[first:last], to_leave[first:last]
     for n in range(entry.size):
@@ -135,7 +136,9 @@ def _copy(entry, leave, to_entry, to_leave, first, last):
 
 
 @device
-def _cut(table, pair, n, samples, direction, k, settings, memory):
+def _cut(
+    table: Any, pair: Any, n: int, samples: int, direction: Vector, k: int, settings: CutSettings, memory: Any
+) -> bool:
     """Add the plane along the direction that separates sample n. Its normal may turn with a body.
 
     The gap counts as a parabola in the segment. Where another corner of a long body comes nearest on the way, it is
@@ -188,14 +191,17 @@ def _cut(table, pair, n, samples, direction, k, settings, memory):
 
 
 @inlined
-def _time_at(obstacle, k, share):
+def _time_at(obstacle: Any, k: int, share: float) -> float:
     """Time (s) at this share of segment k."""
     begin = obstacle.node[k].time
     return begin + share * (obstacle.node[k + 1].time - begin)
 
 
 @inlined
-def _separation_of(table, parts, pair, n, share, k, turning, accuracy, memory, scratch):
+def _separation_of(
+    table: Any, parts: Any, pair: Any, n: int, share: float, k: int, turning: Any, accuracy: Accuracy, memory: Any,
+    scratch: Any,
+) -> float:  # fmt: skip
     """Separation (m) of live sample n at a share of segment k; accuracy: see `separation`."""
     obstacle, off, first, last = memory.obstacle, memory.off, memory.rows.node[0], memory.rows.node[1]
     t, m = _time_at(obstacle, k, share), memory.live[n]
@@ -206,7 +212,7 @@ def _separation_of(table, parts, pair, n, share, k, turning, accuracy, memory, s
 
 
 @inlined
-def _between(first, last, row, n, share):
+def _between(first: Any, last: Any, row: int, n: int, share: float) -> Vector:
     """Vector of sample n in three rows from `row` on, at a share of the way from the array `first` to `last`."""
     return (
         first[row, n] + share * (last[row, n] - first[row, n]),
@@ -216,7 +222,10 @@ def _between(first, last, row, n, share):
 
 
 @inlined
-def _check(table, parts, pair, n, at, samples, k, tolerance, settings, memory, scratch):
+def _check(
+    table: Any, parts: Any, pair: Any, n: int, at: float, samples: int, k: int, tolerance: float,
+    settings: CutSettings, memory: Any, scratch: Any,
+) -> tuple[bool, float]:  # fmt: skip
     """Add a plane to segment k if sample n is apart at this share of it by more than the tolerance (m).
 
     Returns whether that shortens its time inside, and the gap (m).
@@ -229,7 +238,10 @@ def _check(table, parts, pair, n, at, samples, k, tolerance, settings, memory, s
 
 
 @inlined
-def cut_extremes(table, parts, pair, k, extremes, samples, settings, memory, scratch):
+def cut_extremes(
+    table: Any, parts: Any, pair: Any, k: int, extremes: Any, samples: int, settings: CutSettings, memory: Any,
+    scratch: Any,
+) -> None:  # fmt: skip
     """Add planes to segment k of memory.obstacle where some samples of the pilot, the farthest ones, need them.
 
     The errors with which convex bodies meet are about a convex set, so that the samples between them meet if they do.
@@ -246,7 +258,10 @@ def cut_extremes(table, parts, pair, k, extremes, samples, settings, memory, scr
 
 
 @inlined
-def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch):
+def cut_planes(
+    table: Any, parts: Any, pair: Any, k: int, samples: int, wanted: int, settings: CutSettings, memory: Any,
+    scratch: Any,
+) -> tuple[bool, int]:  # fmt: skip
     """Add planes to segment k of memory.obstacle for a pair of shapes (ShapePair), where the live samples need them.
 
     Every second sample is the one that passes the planes most briefly in a BLOCK of samples, in turn, because it may
@@ -299,7 +314,7 @@ def cut_planes(table, parts, pair, k, samples, wanted, settings, memory, scratch
 
 
 @inlined
-def carry_planes(table, pair, k, settings, memory):
+def carry_planes(table: Any, pair: Any, k: int, settings: CutSettings, memory: Any) -> None:
     """Start segment k with those planes of the one before that keep most apart a sample of the pilot between the two.
 
     rows.node[0] has all samples of the pilot at the begin of segment k.
@@ -329,7 +344,7 @@ def carry_planes(table, pair, k, settings, memory):
 
 
 @inlined
-def begin_segment(table, pair, k, samples, settings, memory):
+def begin_segment(table: Any, pair: Any, k: int, samples: int, settings: CutSettings, memory: Any) -> int:
     """Set the intervals of the samples in memory.rows to those behind the planes of segment k. Returns the live ones.
 
     The intervals are shares of the segment.
@@ -351,7 +366,7 @@ def begin_segment(table, pair, k, samples, settings, memory):
 
 
 @inlined
-def end_segment(live, samples, k, memory):
+def end_segment(live: int, samples: int, k: int, memory: Any) -> int:
     """Set memory.alone of the live samples that met in segment k; return the number of all that never met."""
     entry, leave, times = memory.entry, memory.leave, memory.alone
     for n in range(live):

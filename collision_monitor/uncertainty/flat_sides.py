@@ -7,9 +7,10 @@ no plane is better than one at rest.
 from __future__ import annotations
 
 from math import sqrt
-from typing import Final
+from typing import Any, Final
 
 from collision_monitor._jit import device
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.shapes.kinds.box import BOX
 from collision_monitor.shapes.kinds.capsule import CAPSULE
 from collision_monitor.shapes.kinds.cylinder import CYLINDER
@@ -20,7 +21,7 @@ LEVEL: Final = 0.1
 
 
 @device
-def has_side(table, s, R, n):
+def has_side(table: Any, s: int, R: Any, n: Vector) -> bool:
     """Whether shape s, with rotation R, may touch the plane with the normal n (3,) along an edge or a face.
 
     True for all shapes but balls, boxes, capsules and cylinders.

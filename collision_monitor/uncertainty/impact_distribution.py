@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Final
+from typing import Any, Final
 
 from collision_monitor._jit import device
 
@@ -27,7 +27,7 @@ EVENLY_OUTWARD: Final = 1.5
 
 
 @device
-def summarise(times, weights, order, confidence, safe, answer, whole):
+def summarise(times: Any, weights: Any, order: Any, confidence: float, safe: float, answer: Any, whole: float) -> None:
     """Write earliest, most likely and latest time (s) and probability into answer (4,).
 
     times (n,): inf: no impact; weights (n,) with the sum `whole`; order (n,): sorts the times; safe: a time before

@@ -7,7 +7,7 @@ are rounded outward by at most 1 / BINS of the range of the times.
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Final
+from typing import Any, Final
 
 from collision_monitor._jit import device
 from collision_monitor.uncertainty.impact_distribution import EARLIEST, LATEST, MOST_LIKELY, PROBABILITY
@@ -20,7 +20,9 @@ NOT_FOUND: Final = -1.0
 
 
 @device
-def summarise_by_bins(times, weights, sums, outward, confidence, memory, answer):
+def summarise_by_bins(
+    times: Any, weights: Any, sums: Any, outward: float, confidence: float, memory: Any, answer: Any
+) -> float:
     """Write earliest, most likely and latest time (s) and probability into answer (4,); see `summarise`.
 
     times (n,): of the first samples; inf: no impact. weights, sums: see

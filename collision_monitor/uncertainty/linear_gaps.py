@@ -9,14 +9,14 @@ axis costs each sample a term of its own. Samples are in single precision, see s
 from __future__ import annotations
 
 from math import sqrt
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy import float32
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.geometry.vector import cross
+from collision_monitor.geometry.vector import Vector, cross
 from collision_monitor.shapes.kinds.box import BOX
 from collision_monitor.shapes.kinds.capsule import CAPSULE
 from collision_monitor.shapes.kinds.circle import CIRCLE
@@ -43,14 +43,14 @@ def make_terms() -> NDArray[np.float64]:
 
 
 @inlined
-def is_linear(table, s):
+def is_linear(table: Any, s: int) -> bool:
     """Whether shape s has gaps in this form."""
     kind = table.kind[s]
     return kind == BOX or kind == CAPSULE or kind == CYLINDER or kind == SPHERE or kind == CIRCLE
 
 
 @inlined
-def _add(row, body, own, mode, turned, factor, v):
+def _add(row: Any, body: int, own: bool, mode: int, turned: bool, factor: float, v: Vector) -> None:
     """Add factor times v . (w_mode - w_body) to a row: errors turn the plane with one body, and the body itself."""
     for c in range(3):
         if own:
@@ -60,7 +60,7 @@ def _add(row, body, own, mode, turned, factor, v):
 
 
 @inlined
-def _most(row, node):
+def _most(row: Any, node: Any) -> float:
     """Bound on the magnitude of a row's part from errors of orientation at a node (NODE)."""
     most = 0.0
     for body in range(2):
@@ -74,7 +74,7 @@ def _most(row, node):
 
 
 @inlined
-def _begin_term(row, along, size):
+def _begin_term(row: Any, along: float, size: float) -> None:
     """Set a row to a value without errors, and its factor."""
     for c in range(COLUMNS):
         row[c] = 0.0
@@ -82,7 +82,7 @@ def _begin_term(row, along, size):
 
 
 @inlined
-def begin_terms(n, p, reach, mode, turned, terms):
+def begin_terms(n: Vector, p: Any, reach: float, mode: int, turned: bool, terms: Any) -> int:
     """Set the linear part to the gap of points, less a reach (m). Returns 1: the number of rows in use.
 
     n, p (3,): stated normal, and position of B relative to A. mode, turned: see `sum_terms`.
@@ -97,7 +97,9 @@ def begin_terms(n, p, reach, mode, turned, terms):
 
 
 @inlined
-def add_reach(table, s, body, R, o, n, plane, node, terms, count):
+def add_reach(
+    table: Any, s: int, body: int, R: Any, o: Any, n: Vector, plane: Any, node: Any, terms: Any, count: int
+) -> int:
     """Subtract the support value of shape s of a body, along n for A and -n for B, from the gap in terms[LINEAR].
 
     R, o: rotation of the shape, and its offset from its body's origin. plane (own, mode, turned): whether errors turn
@@ -150,7 +152,7 @@ def add_reach(table, s, body, R, o, n, plane, node, terms, count):
 
 
 @inlined
-def _project(row, state, first, last, out):
+def _project(row: Any, state: Any, first: int, last: int, out: Any) -> None:
     """Write the values of a row for samples first:last into out (last - first,)."""
     along = float32(row[ALONG])
     ax, ay, az = float32(row[OWN]), float32(row[OWN + 1]), float32(row[OWN + 2])
@@ -173,7 +175,10 @@ def _project(row, state, first, last, out):
 
 
 @device
-def sum_terms(n, mode, turned, terms, count, state, first, last, local, gap):
+def sum_terms(
+    n: Vector, mode: int, turned: bool, terms: Any, count: int, state: Any, first: int, last: int, local: Any,
+    gap: Any,
+) -> None:  # fmt: skip
     """Write the gaps of samples first:last along the plane n (3,) into gap (last - first,).
 
     state (STATE, S): the samples; mode, turned: the body with which the plane turns, whether errors turn it; local

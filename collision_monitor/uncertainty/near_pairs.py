@@ -7,7 +7,7 @@ room beside it.
 from __future__ import annotations
 
 from math import inf
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.impact.body_contact import relative_now
@@ -26,7 +26,7 @@ class NearPairRange(NamedTuple):
 
 
 @kernel
-def find_near(multibody, spread, entries, now, nearness, found):
+def find_near(multibody: Any, spread: Any, entries: Any, now: float, nearness: NearPairRange, found: Any) -> int:
     """Write the indices of the entries (n,) whose bodies could meet within the horizon into found (n,).
 
     entries: records with the body slots i and j. Pairs without uncertainty are left out. Returns their number.
@@ -41,7 +41,7 @@ def find_near(multibody, spread, entries, now, nearness, found):
 
 
 @inlined
-def _could_meet(multibody, spread, i, j, now, nearness):
+def _could_meet(multibody: Any, spread: Any, i: int, j: int, now: float, nearness: NearPairRange) -> bool:
     """Whether the grown bounding spheres of bodies i and j meet. Accelerations count as growth."""
     table, parts, bodies = multibody
     sigmas, margin, horizon, stale_acceleration = nearness
@@ -65,7 +65,7 @@ def _could_meet(multibody, spread, i, j, now, nearness):
 
 
 @device
-def _stays_beside(table, parts, bodies, i, radius, way):
+def _stays_beside(table: Any, parts: Any, bodies: Any, i: int, radius: float, way: Any) -> bool:
     """Whether one face of body i, a static box, keeps a sphere of this radius (m) away.
 
     way: relative position (m) and velocity (m/s) of the bodies' origins, the distance (m) that does not suffice now and

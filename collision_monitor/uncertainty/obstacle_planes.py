@@ -13,6 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.motion.bodies import place_shape
 from collision_monitor.motion.motion import relative_position, rotation_at
 from collision_monitor.motion.trigonometry import sin_cos
@@ -85,7 +86,7 @@ def make_obstacle() -> Obstacle:
 
 
 @device
-def _set_turns(m, t, off, yaw_only, turn, left):
+def _set_turns(m: Any, t: float, off: Any, yaw_only: bool, turn: Any, left: Any) -> None:
     """Write the rotation vectors of a body with motion m at time t for unit errors; off: see `orientation_spread`."""
     set_turn(m, t, (off[0], off[1]), yaw_only, turn)
     if off[3] > 0.0:
@@ -97,7 +98,7 @@ def _set_turns(m, t, off, yaw_only, turn, left):
 
 
 @device
-def _place(table, parts, pair, t, turning, yaw_only, scratch, node):
+def _place(table: Any, parts: Any, pair: Any, t: float, turning: Any, yaw_only: Any, scratch: Any, node: Any) -> None:
     """Set a node to time t, see `set_nodes`."""
     A, B, a, b = pair
     R_i, R_j = scratch.rotation[0], scratch.rotation[1]
@@ -115,7 +116,9 @@ def _place(table, parts, pair, t, turning, yaw_only, scratch, node):
 
 
 @inlined
-def set_middles(table, parts, pair, segments, turning, yaw_only, scratch, obstacle):
+def set_middles(
+    table: Any, parts: Any, pair: Any, segments: int, turning: Any, yaw_only: Any, scratch: Any, obstacle: Obstacle
+) -> None:
     """Place the shapes of the pair (ShapePair) in the middle of each segment. turning, yaw_only: see `set_nodes`."""
     for k in range(segments):
         middle = 0.5 * (obstacle.node[k].time + obstacle.node[k + 1].time)
@@ -123,7 +126,10 @@ def set_middles(table, parts, pair, segments, turning, yaw_only, scratch, obstac
 
 
 @device
-def set_nodes(table, parts, pair, window, length, turning, yaw_only, scratch, obstacle):
+def set_nodes(
+    table: Any, parts: Any, pair: Any, window: Any, length: float, turning: Any, yaw_only: Any, scratch: Any,
+    obstacle: Obstacle,
+) -> int:  # fmt: skip
     """Divide the window into segments of this length (s) without planes; return their number, at most MOST_SEGMENTS.
 
     The last one is shorter, or the segments end before the window. Places the shapes of the pair (ShapePair) at their
@@ -144,7 +150,10 @@ def set_nodes(table, parts, pair, window, length, turning, yaw_only, scratch, ob
 
 
 @device
-def split_segment(table, parts, pair, k, segments, turning, yaw_only, scratch, obstacle):
+def split_segment(
+    table: Any, parts: Any, pair: Any, k: int, segments: int, turning: Any, yaw_only: Any, scratch: Any,
+    obstacle: Obstacle,
+) -> None:  # fmt: skip
     """Divide segment k of the obstacle, with its planes, into two halves. There is room for one more segment."""
     planes, count, node, middle = obstacle.planes, obstacle.count, obstacle.node, obstacle.middle
     for m in range(segments, k, -1):
@@ -161,7 +170,7 @@ def split_segment(table, parts, pair, k, segments, turning, yaw_only, scratch, o
 
 
 @inlined
-def from_plane(plane, R):
+def from_plane(plane: Any, R: Any) -> Any:
     """Normal of a plane in world axes, at a node with the rotations R (2, 3, 3) of the shapes."""
     x, y, z, mode = plane[0], plane[1], plane[2], int(plane[MODE])
     if mode == AT_REST:
@@ -175,7 +184,7 @@ def from_plane(plane, R):
 
 
 @inlined
-def set_plane(n, mode, obstacle, plane):
+def set_plane(n: Vector, mode: int, obstacle: Obstacle, plane: Any) -> None:
     """Write the plane along n (3,), a unit vector from shape a to shape b, where obstacle.placed has the shapes."""
     x, y, z = n
     if mode != AT_REST:
@@ -189,7 +198,7 @@ def set_plane(n, mode, obstacle, plane):
 
 
 @inlined
-def _turn_by(R, v):
+def _turn_by(R: Any, v: Any) -> None:
     """Turn the rotation R (3, 3) by the rotation vector v (3,)."""
     x, y, z = v
     angle = sqrt(x * x + y * y + z * z)
@@ -208,7 +217,10 @@ def _turn_by(R, v):
 
 
 @device
-def separation_at(table, parts, pair, t, error, turned, accuracy, obstacle, scratch):
+def separation_at(
+    table: Any, parts: Any, pair: Any, t: float, error: Vector, turned: Any, accuracy: Any, obstacle: Obstacle,
+    scratch: Any,
+) -> float:  # fmt: skip
     """Return the separation (m) of a pair of shapes at time t, with B off by `error` (3,).
 
     turned: rotation vectors (3,) of the errors of orientation of A and of B; accuracy: see `separation`. Writes the

@@ -6,6 +6,7 @@ from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.uncertainty.samples.error_samples import LEFT_OVER, ORIENTATION, add_covariance, errors_turn
 from collision_monitor.uncertainty.samples.normal_samples import DIMENSIONS
 from collision_monitor.uncertainty.samples.sample_gaps import FIRST_ORDER, NOT_TURNED, SERIES
@@ -38,20 +39,20 @@ class PairErrors(NamedTuple):
 
 
 @inlined
-def spin_rate(m):
+def spin_rate(m: Any) -> float:
     """Magnitude of the angular velocity of a motion (rad/s)."""
     return sqrt(m.wx * m.wx + m.wy * m.wy + m.wz * m.wz)
 
 
 @inlined
-def surface_bend(m, radius):
+def surface_bend(m: Any, radius: float) -> float:
     """Bound on the acceleration of a body's surface from its rotation (m/s^2)."""
     rate = spin_rate(m)
     return radius * rate * rate if rate > 0.0 else 0.0
 
 
 @inlined
-def swing_bound(spread, i, radius, age, horizon):
+def swing_bound(spread: Any, i: int, radius: float, age: float, horizon: float) -> tuple[float, float]:
     """Bound (m now, m/s) on the standard deviation of body i's surface from errors of its orientation.
 
     The parts are added instead of their squares, as in `surface_spread`. radius (m): the body's, infinite or 0 if
@@ -66,20 +67,20 @@ def swing_bound(spread, i, radius, age, horizon):
 
 
 @inlined
-def turned_at(errors, body):
+def turned_at(errors: PairErrors, body: int) -> float:
     """Standard deviation of the orientation of a body at the time when it counts most (rad)."""
     return deviation_at(errors.turning[body], errors.late)
 
 
 @inlined
-def deviation_at(off, t):
+def deviation_at(off: Any, t: float) -> float:
     """Standard deviation (rad) of an orientation at time t (s); off: orientation_spread."""
     own, left = off[0] + off[1] * t, off[2] + off[3] * t
     return sqrt(own * own + left * left) if left != 0.0 else own
 
 
 @device
-def gap_deviation(n, root, errors, t):
+def gap_deviation(n: Vector, root: Any, errors: PairErrors, t: float) -> float:
     """Standard deviation (m) of the gap along n (3,), in the axes of the root, at time t.
 
     root (6, 6): lower Cholesky factor of the covariance of position at errors.time and of velocity.
@@ -97,7 +98,7 @@ def gap_deviation(n, root, errors, t):
 
 
 @device
-def fineness(root, errors, tolerance, least):
+def fineness(root: Any, errors: PairErrors, tolerance: float, least: float) -> tuple[float, float]:
     """Factor of a tolerance (m) now, and its growth (1/s), which make it finer while the errors are smaller.
 
     The gap of bodies that are near each other now, with errors that grow from 0, is small for the later errors only.
@@ -113,7 +114,7 @@ def fineness(root, errors, tolerance, least):
 
 
 @inlined
-def are_fine(errors, tolerance):
+def are_fine(errors: PairErrors, tolerance: float) -> bool:
     """Whether samples in single precision are exact enough for a tolerance (m) of the planes, see sample_gaps.py."""
     turned, sigma = turned_at(errors, 0) + turned_at(errors, 1) > 0.0, errors.sigma
     if turned and ROUNDING * (errors.radius[0] + errors.radius[1]) > tolerance:
@@ -122,7 +123,7 @@ def are_fine(errors, tolerance):
 
 
 @inlined
-def turning_order(errors, body, tolerance):
+def turning_order(errors: PairErrors, body: int, tolerance: float) -> int:
     """How errors of orientation turn a body: the second order counts if it moves the surface by the tolerance (m)."""
     off = turned_at(errors, body)
     if off == 0.0:
@@ -131,7 +132,7 @@ def turning_order(errors, body, tolerance):
 
 
 @inlined
-def coordinates_in_use(errors):
+def coordinates_in_use(errors: PairErrors) -> int:
     """Number of the coordinates of a sample that matter: those of position and velocity come first."""
     one, other = errors.turning
     if one[3] > 0.0 or other[3] > 0.0:
@@ -140,14 +141,14 @@ def coordinates_in_use(errors):
 
 
 @inlined
-def turning_rate(errors):
+def turning_rate(errors: PairErrors) -> float:
     """Sum of the errors of the angular velocities of both bodies, one standard deviation (rad/s)."""
     one, other = errors.turning
     return one[1] + one[3] + other[1] + other[3]
 
 
 @inlined
-def straight_length(A, B, errors, bending):
+def straight_length(A: Any, B: Any, errors: PairErrors, bending: float) -> float:
     """Length (s) of a part of the time in which gaps deviate by less than `bending` stddevs from a straight line.
 
     A normal that turns while the bodies pass each other bends the gap like an acceleration of the surfaces.
@@ -164,7 +165,9 @@ def straight_length(A, B, errors, bending):
 
 
 @inlined
-def set_gap_covariance(multibody, spread, i, j, ages, t, right, sampling, work):
+def set_gap_covariance(
+    multibody: Any, spread: Any, i: int, j: int, ages: Any, t: float, right: float, sampling: Any, work: Any
+) -> None:
     """Write the covariance of relative position at t and of relative velocity, along work.frame, into work.joint.
 
     right: see `add_covariance`.
@@ -178,7 +181,7 @@ def set_gap_covariance(multibody, spread, i, j, ages, t, right, sampling, work):
 
 
 @inlined
-def acceleration_terms(multibody, spread, i, j, ages):
+def acceleration_terms(multibody: Any, spread: Any, i: int, j: int, ages: Any) -> Vector:
     """Factors (3,) of t^2, t^3 and t^4 in the variance of the gap from unknown accelerations from now on.
 
     A body is off by e (age + t)^2 / 2 then, with the same e before now, which `add_covariance` includes.

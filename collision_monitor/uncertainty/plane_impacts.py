@@ -117,7 +117,10 @@ class Laid(NamedTuple):
 
 
 @outlined
-def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, work):
+def _lay_planes(
+    table: Any, parts: Any, pair: ShapePair, errors: Any, search: PlaneSearch, until: float, sampling: Any,
+    memory: Any, work: Any,
+) -> Laid:  # fmt: skip
     """Bound the obstacle of a pair of shapes (ShapePair) by planes where the samples of the search need them.
 
     Writes the times of these samples into memory.alone, infinite for those that do not meet. until: s; later impacts do
@@ -192,7 +195,7 @@ def _lay_planes(table, parts, pair, errors, search, until, sampling, memory, wor
 
 
 @inlined
-def _is_left_out(quiet, k, segments):
+def _is_left_out(quiet: Any, k: int, segments: int) -> bool:
     """Whether segment k is left out for all samples: none can meet there, or it is quiet between quiet ones.
 
     Of all samples, a few may meet in a segment in which none of the pilot does, if it is next to one in which some do.
@@ -203,7 +206,10 @@ def _is_left_out(quiet, k, segments):
 
 
 @outlined
-def _enter_pair(table, parts, pair, laid, errors, points, samples, verified, tolerance, memory, work):
+def _enter_pair(
+    table: Any, parts: Any, pair: ShapePair, laid: Laid, errors: Any, points: Any, samples: int, verified: int,
+    tolerance: float, memory: Any, work: Any,
+) -> bool:  # fmt: skip
     """Lower memory.times to the impacts of the first `samples` with the planes that are laid, and some more.
 
     verified: number of samples that must need no new plane if all enter in the same segment, or if there is but one;
@@ -242,7 +248,9 @@ def _enter_pair(table, parts, pair, laid, errors, points, samples, verified, tol
 
 
 @device
-def enter_bodies(multibody, i, j, errors, sampling, columns, memory, work):
+def enter_bodies(
+    multibody: Any, i: int, j: int, errors: Any, sampling: Any, columns: Any, memory: Any, work: Any
+) -> int:
     """Write the times of the samples' impacts of bodies i and j into memory.times.
 
     work.joint: root of the covariance of the pair. Returns the number of samples, see `choose_samples`, or TOO_FAST.
@@ -294,7 +302,9 @@ def enter_bodies(multibody, i, j, errors, sampling, columns, memory, work):
 
 
 @device
-def enter_surely(multibody, i, j, errors, sampling, columns, memory, work):
+def enter_surely(
+    multibody: Any, i: int, j: int, errors: Any, sampling: Any, columns: Any, memory: Any, work: Any
+) -> int:
     """`enter_bodies` for bodies that surely meet until errors.time: only the times of their impacts are sought.
 
     The samples are those of the pilot, with equal weights, because no error matters more than the others.
@@ -321,7 +331,7 @@ def enter_surely(multibody, i, j, errors, sampling, columns, memory, work):
 
 
 @inlined
-def _lower(times, others, count):
+def _lower(times: Any, others: Any, count: int) -> None:
     """Lower the first `count` times to the others."""
     for n in range(count):
         times[n] = min(times[n], others[n])

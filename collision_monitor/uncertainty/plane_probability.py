@@ -8,7 +8,7 @@ that turn very fast, are left to `uncertainty.py`. docs/uncertainty.md describes
 from __future__ import annotations
 
 from math import inf, nan
-from typing import Final
+from typing import Any, Final
 
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.impact.body_impact import ImpactQuery, ShapePair, Tube, Window
@@ -50,7 +50,7 @@ LEFT: Final = -1.0
 
 
 @inlined
-def _approach(A, B, horizon):
+def _approach(A: Any, B: Any, horizon: float) -> float:
     """Time (s), from now to the horizon, at which the origins are closest."""
     px, py, pz = B.x - A.x, B.y - A.y, B.z - A.z
     vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
@@ -59,7 +59,10 @@ def _approach(A, B, horizon):
 
 
 @kernel
-def plane_probabilities(multibody, spread, pairs, now, sampling, columns, memory, work, answers):
+def plane_probabilities(
+    multibody: Any, spread: Any, pairs: Any, now: float, sampling: Any, columns: Any, memory: Any, work: Any,
+    answers: Any,
+) -> int:  # fmt: skip
     """Write times (s after `now`) and probabilities of impact of pairs (P, 2) of body slots into answers (P, 4).
 
     An answer is NaN if neither body has declared an uncertainty, or if the pair is stated to pass and its probability
@@ -166,7 +169,7 @@ def plane_probabilities(multibody, spread, pairs, now, sampling, columns, memory
 
 
 @device
-def _first_meeting(A, B, tube, sampling):
+def _first_meeting(A: Any, B: Any, tube: Tube, sampling: Any) -> float:
     """Time (s) before which the bounding spheres, grown by safe_sigmas, do not meet."""
     reach = A.radius + B.radius + sampling.query.margin + sampling.safe_sigmas * tube.start
     if not reach < inf:
@@ -177,7 +180,7 @@ def _first_meeting(A, B, tube, sampling):
 
 
 @inlined
-def _set_axes(frame):
+def _set_axes(frame: Any) -> None:
     """Set the frame (3, 3) to the world axes."""
     for r in range(3):
         for c in range(3):

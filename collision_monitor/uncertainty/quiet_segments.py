@@ -7,7 +7,7 @@ segment gives the direction, which is at rest.
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 from collision_monitor._jit import device
 from collision_monitor.narrow_phase.gjk import Accuracy
@@ -21,7 +21,7 @@ SLACK: Final = 0.02
 
 
 @device
-def stay_apart(table, parts, pair, k, errors, margin, obstacle, work):
+def stay_apart(table: Any, parts: Any, pair: Any, k: int, errors: Any, margin: float, obstacle: Any, work: Any) -> bool:
     """Whether a pair of shapes stays apart in segment k of the obstacle, with errors of FURTHEST standard deviations.
 
     work.joint: see `gap_deviation`, along work.frame.

@@ -7,10 +7,10 @@ heights suffice for people, so that they need no planes.
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Final
+from typing import Any, Final
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.geometry.vector import cross, dot
+from collision_monitor.geometry.vector import Vector, cross, dot
 from collision_monitor.motion.bodies import place_shape
 from collision_monitor.motion.motion import half_acceleration
 from collision_monitor.narrow_phase.cylinder_cylinder import is_parallel
@@ -43,13 +43,13 @@ LEVELS: Final = 3
 
 
 @inlined
-def _axis(R, side):
+def _axis(R: Any, side: int) -> Vector:
     """Axis (3,) of a cylinder that is placed with R[side]."""
     return R[side, 0, 2], R[side, 1, 2], R[side, 2, 2]
 
 
 @inlined
-def _ends(table, pair, t, axis, offsets):
+def _ends(table: Any, pair: Any, t: float, axis: Vector, offsets: Any) -> Any:
     """Lowest and highest points of both cylinders at time t, and the height of B's origin, over the origin of A (m)."""
     A, B, a, b = pair
     x, y, z = B.x - A.x + t * (B.vx - A.vx), B.y - A.y + t * (B.vy - A.vy), B.z - A.z + t * (B.vz - A.vz)
@@ -60,13 +60,13 @@ def _ends(table, pair, t, axis, offsets):
 
 
 @inlined
-def _shared(ends):
+def _shared(ends: Any) -> float:
     """Height (m) that two cylinders with these ends share; negative: one is above the other."""
     return min(ends[0][1], ends[1][1]) - max(ends[0][0], ends[1][0])
 
 
 @device
-def round_form(table, parts, pair, errors, margin, work):
+def round_form(table: Any, parts: Any, pair: Any, errors: Any, margin: float, work: Any) -> int:
     """Form of two bodies with these first shapes, see NOT_ROUND. A cylinder may turn about its own axis."""
     A, B, a, b = pair
     if parts.next[a] >= 0 or parts.next[b] >= 0 or half_acceleration(A, B) > 0.0:
@@ -106,7 +106,7 @@ def round_form(table, parts, pair, errors, margin, work):
 
 
 @inlined
-def _set_lowest(then, t, axis, first, last, off, lifts, step):
+def _set_lowest(then: Any, t: float, axis: Vector, first: int, last: int, off: Any, lifts: Any, step: Any) -> None:
     """Write the ways (m) from the origins of A, down, and of B, up, to the lowest height that the samples first:last
     share, into lifts (2, S), and the way to the next level into step (S,).
 
@@ -124,7 +124,10 @@ def _set_lowest(then, t, axis, first, last, off, lifts, step):
 
 
 @device
-def _enter_tilted(table, parts, pair, errors, end, first, last, points, memory, work):
+def _enter_tilted(
+    table: Any, parts: Any, pair: Any, errors: Any, end: float, first: int, last: int, points: Any, memory: Any,
+    work: Any,
+) -> None:  # fmt: skip
     """`_enter_round` for the form TILTED."""
     A, B, a, b = pair
     R, off, times = work.scratch.rotation, memory.off, memory.times
@@ -154,7 +157,10 @@ def _enter_tilted(table, parts, pair, errors, end, first, last, points, memory, 
 
 
 @device
-def _enter_round(table, parts, pair, form, errors, end, margin, first, last, points, memory, work):
+def _enter_round(
+    table: Any, parts: Any, pair: Any, form: int, errors: Any, end: float, margin: float, first: int, last: int,
+    points: Any, memory: Any, work: Any,
+) -> None:  # fmt: skip
     """Write the impacts of the samples first:last of bodies of this form, see `round_form`, into memory.times."""
     A, B, a, b = pair
     if form == TILTED:
@@ -172,7 +178,10 @@ def _enter_round(table, parts, pair, form, errors, end, margin, first, last, poi
 
 
 @device
-def enter_round_bodies(table, parts, pair, form, errors, sure, sampling, columns, memory, work):
+def enter_round_bodies(
+    table: Any, parts: Any, pair: Any, form: int, errors: Any, sure: bool, sampling: Any, columns: Any, memory: Any,
+    work: Any,
+) -> int:  # fmt: skip
     """Write the times of the samples' impacts of bodies of a form, see `round_form`, into memory.times.
 
     work.joint: root of the covariance of the pair; sure: they surely meet. Returns the number of samples, see

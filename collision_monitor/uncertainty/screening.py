@@ -13,6 +13,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.impact.body_impact import ImpactQuery, ShapePair, Tube, Window, shape_impact
 from collision_monitor.impact.impact_record import CLEAR, HIT
 from collision_monitor.impact.sphere_interval import sphere_interval
@@ -50,7 +51,7 @@ TAIL: Final = np.array([NormalDist().cdf(-k / _FINENESS) for k in range(6 * _FIN
 
 
 @inlined
-def _tail(beta):
+def _tail(beta: float) -> float:
     """Probability, rounded up, that a normal error exceeds beta standard deviations."""
     if not beta > 0.0:
         return 1.0
@@ -58,7 +59,9 @@ def _tail(beta):
 
 
 @inlined
-def meeting(table, parts, pair, horizon, margin, tube, work):
+def meeting(
+    table: Any, parts: Any, pair: ShapePair, horizon: float, margin: float, tube: Tube, work: Any
+) -> tuple[float, float]:
     """Interval (s) in which the bounding spheres of a pair of shapes meet within the tube; (inf, -inf): never."""
     A, B, a, b = pair
     reach = table.radius[a] + table.radius[b] + margin + tube.start
@@ -83,7 +86,7 @@ class GapGrowth(NamedTuple):
 
 
 @inlined
-def _quadratic(block, row, column, n):
+def _quadratic(block: Any, row: int, column: int, n: Vector) -> float:
     """n^T C n for the 3 x 3 block of a matrix that begins at (row, column)."""
     total = 0.0
     for r in range(3):
@@ -93,7 +96,7 @@ def _quadratic(block, row, column, n):
 
 
 @inlined
-def _beta(gap, variance, accelerations, t):
+def _beta(gap: float, variance: Vector, accelerations: Vector, t: float) -> float:
     """Standard deviations between a pair and contact at time t; variance (3,): of position and velocity, by powers."""
     c, d, e = variance
     a, b, q = accelerations
@@ -101,7 +104,9 @@ def _beta(gap, variance, accelerations, t):
 
 
 @device
-def _least_beta(gaps, n, growth, joint, t, window):
+def _least_beta(
+    gaps: Any, n: Vector, growth: GapGrowth, joint: Any, t: float, window: Window
+) -> tuple[Vector, float, float]:
     """Deviations between a pair and contact along n (3,) as a function of time, when they are fewest, and a bound.
 
     gaps: at both ends of the window (m). growth: GapGrowth. joint (6, 6): covariance of position at time t and of
@@ -136,7 +141,7 @@ def _least_beta(gaps, n, growth, joint, t, window):
 
 
 @inlined
-def _towards(A, B, t):
+def _towards(A: Any, B: Any, t: float) -> Vector:
     """Unit vector from the origin of A to that of B at time t."""
     x, y, z = relative_position(A, B, t)
     length = sqrt(x * x + y * y + z * z)
@@ -144,7 +149,9 @@ def _towards(A, B, t):
 
 
 @inlined
-def _set_window(table, parts, pair, window, bend, work, obstacle):
+def _set_window(
+    table: Any, parts: Any, pair: ShapePair, window: Window, bend: float, work: Any, obstacle: Any
+) -> float:
     """Place the shapes of a pair at both ends of a window. Return how far a gap may bend between them (m)."""
     length = window.end - window.begin
     set_nodes(table, parts, pair, window, length, NO_TURNS, ABOUT_ALL, work.scratch, obstacle)
@@ -152,7 +159,9 @@ def _set_window(table, parts, pair, window, bend, work, obstacle):
 
 
 @inlined
-def _bound(table, pair, n, times, growth, margin, obstacle, work):
+def _bound(
+    table: Any, pair: ShapePair, n: Vector, times: Vector, growth: GapGrowth, margin: float, obstacle: Any, work: Any
+) -> tuple[Vector, float, float]:
     """`_least_beta` along n (3,) in the window that is set.
 
     times: that of work.joint, and both ends of the window (s).
@@ -164,7 +173,9 @@ def _bound(table, pair, n, times, growth, margin, obstacle, work):
 
 
 @inlined
-def design_point(multibody, i, j, tube, growth, sampling, t, obstacle, work):
+def design_point(
+    multibody: Any, i: int, j: int, tube: Tube, growth: GapGrowth, sampling: Any, t: float, obstacle: Any, work: Any
+) -> tuple[float, float]:
     """Return (bound, time): a bound on the probability of contact, and the time at which contact is likeliest.
 
     t: time of closest approach; growth: GapGrowth. Writes the direction of the gap then into work.frame[0]: the design

@@ -68,7 +68,7 @@ def worst_stddevs(covariance: NDArray[np.float64]) -> tuple[NDArray[np.float64],
 
 
 @kernel
-def take_spread(spread, slots, numbers, flags, covariance, planar):
+def take_spread(spread: Spread, slots: Any, numbers: Any, flags: Any, covariance: Any, planar: bool) -> None:
     """Store the uncertainties of states.
 
     slots (M,) int32, -1: skip the state; numbers (M, 21): the rows of records.STATE; flags (M,); covariance (M, 12), or
@@ -97,7 +97,7 @@ def take_spread(spread, slots, numbers, flags, covariance, planar):
 
 
 @device
-def is_uncertain(spread, i):
+def is_uncertain(spread: Spread, i: int) -> bool:
     """Whether body i has declared any uncertainty, or a bound on its acceleration."""
     s = spread.stddev
     declared = s[i, 0] > 0.0 or s[i, 1] > 0.0 or s[i, 2] > 0.0 or s[i, 3] > 0.0
@@ -105,13 +105,13 @@ def is_uncertain(spread, i):
 
 
 @inlined
-def accelerates(spread, i):
+def accelerates(spread: Spread, i: int) -> bool:
     """Whether body i has declared a bound on its acceleration."""
     return spread.acceleration[i, 0] > 0.0 or spread.acceleration[i, 1] > 0.0
 
 
 @inlined
-def turns_by_yaw(spread, i, planar):
+def turns_by_yaw(spread: Spread, i: int, planar: bool) -> bool:
     """Whether errors of orientation turn body i about the z axis alone.
 
     planar: the whole scene is. In space, an unknown angular acceleration has any axis.
@@ -120,7 +120,7 @@ def turns_by_yaw(spread, i, planar):
 
 
 @device
-def swing_radius(bodies, spread, i):
+def swing_radius(bodies: Any, spread: Spread, i: int) -> float:
     """Distance (m) of the farthest point that errors of orientation move; 0: none, as of an upright cylinder by yaw."""
     if not (bodies.revolved[i] and turns_by_yaw(spread, i, False)):
         return bodies.spin_radius[i]
@@ -130,7 +130,7 @@ def swing_radius(bodies, spread, i):
 
 
 @device
-def unknown_acceleration(spread, i, silent, which, stale_acceleration):
+def unknown_acceleration(spread: Spread, i: int, silent: bool, which: int, stale_acceleration: float) -> float:
     """Standard deviation along one axis of body i's unknown acceleration: m/s^2 (which 0) or rad/s^2 (which 1).
 
     A stale object widens its spread here: a silent body without a declared bound may accelerate by stale_acceleration.
@@ -142,7 +142,9 @@ def unknown_acceleration(spread, i, silent, which, stale_acceleration):
 
 
 @device
-def surface_spread(spread, i, radius, age, ahead, stale_acceleration):
+def surface_spread(
+    spread: Spread, i: int, radius: float, age: float, ahead: float, stale_acceleration: float
+) -> tuple[float, float]:
     """Bound the standard deviation along one axis of every point of body i: now (m), and growth until `ahead` (m/s).
 
     radius: swing_radius; age, ahead: s since the last state, s from now. The parts are added instead of their squares,

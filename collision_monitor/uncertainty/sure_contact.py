@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import sqrt
+from typing import Any
 
 from collision_monitor._jit import device
 from collision_monitor.impact.body_impact import ShapePair, contact_at
@@ -12,7 +13,9 @@ from collision_monitor.uncertainty.samples.normal_samples import FURTHEST
 
 
 @device
-def surely_meet(table, parts, pair, joint, swing, t, margin, scratch):
+def surely_meet(
+    table: Any, parts: Any, pair: ShapePair, joint: Any, swing: Any, t: float, margin: float, scratch: Any
+) -> bool:
     """Whether bodies with these first shapes (ShapePair) meet until time t with a probability above 0.9998.
 
     Two of their shapes overlap at t. To separate them, the errors of their relative position, joint (6, 6) at t, and of

@@ -15,6 +15,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor._jit import allocating_kernel, device, inlined, kernel
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.impact.body_impact import (
     ImpactQuery,
     ShapePair,
@@ -114,7 +115,7 @@ FEW_SPARE: Final = 5
 
 
 @device
-def first_contact(multibody, i, j, window, tube, query, work):
+def first_contact(multibody: Any, i: int, j: int, window: Window, tube: Tube, query: ImpactQuery, work: Any) -> float:
     """First time in the window at which bodies i and j are within query.margin and the tube; infinite: never.
 
     They move as in work.motion. Time 0 of the motions and of the tube is now.
@@ -147,7 +148,7 @@ def first_contact(multibody, i, j, window, tube, query, work):
 
 
 @device
-def _gap_at(multibody, i, j, t, work):
+def _gap_at(multibody: Any, i: int, j: int, t: float, work: Any) -> float:
     """Signed distance (m) of the shapes of bodies i and j at t.
 
     Writes its direction into work.block[0], and the points where they touch, about both origins, into work.block[1:3].
@@ -170,7 +171,7 @@ def _gap_at(multibody, i, j, t, work):
 
 
 @device
-def likely_contact(multibody, i, j, t, horizon, query, work):
+def likely_contact(multibody: Any, i: int, j: int, t: float, horizon: float, query: ImpactQuery, work: Any) -> float:
     """Time (s) from t on at which bodies i and j, which are stated to meet, do so if they are apart at t, else t.
 
     t: closest approach of their origins. The origin of a long wall may be closest long before it is touched.
@@ -185,7 +186,7 @@ def likely_contact(multibody, i, j, t, horizon, query, work):
 
 
 @inlined
-def _is_straight(parts, bodies, i, j, A, B):
+def _is_straight(parts: Any, bodies: Any, i: int, j: int, A: Any, B: Any) -> bool:
     """Whether each body is one shape that moves straight and does not turn, and they are not both spheres."""
     a, b = bodies.first_shape[i], bodies.first_shape[j]
     bends = A.wx != 0.0 or A.wy != 0.0 or A.wz != 0.0 or B.wx != 0.0 or B.wy != 0.0 or B.wz != 0.0
@@ -195,7 +196,7 @@ def _is_straight(parts, bodies, i, j, A, B):
 
 
 @inlined
-def body_has_mesh(table, parts, shape):
+def body_has_mesh(table: Any, parts: Any, shape: int) -> bool:
     """Whether one of a body's shapes, from its first on, is a mesh or a cloud."""
     found = False
     while shape >= 0:
@@ -205,7 +206,7 @@ def body_has_mesh(table, parts, shape):
 
 
 @kernel
-def find_divisors(multibody, pairs, horizon, divisors):
+def find_divisors(multibody: Any, pairs: Any, horizon: float, divisors: Any) -> None:
     """Write the number by which the samples of each pair (P, 2) are divided to divisors (P,).
 
     COSTLY_PARTS for a body with a mesh or a cloud, or one that turns too far for any search within the horizon (s);
@@ -221,7 +222,7 @@ def find_divisors(multibody, pairs, horizon, divisors):
 
 
 @device
-def _lay_along(multibody, i, j, tube, sampling, work):
+def _lay_along(multibody: Any, i: int, j: int, tube: Tube, sampling: Sampling, work: Any) -> float:
     """Return the time that matters most, and write the frame along which to lay the samples into work.frame.
 
     For bodies that are stated to meet, or two spheres: the closest approach of the centres, and the miss across the
@@ -255,7 +256,7 @@ def _lay_along(multibody, i, j, tube, sampling, work):
 
 
 @device
-def _least_tolerance(multibody, i, j, turning, t, margin, work):
+def _least_tolerance(multibody: Any, i: int, j: int, turning: Any, t: float, margin: float, work: Any) -> float:
     """Tolerance (m) of the samples' impacts that suffices now, when errors may still be small; infinite for overlaps.
 
     The larger one of NEAR of the gap now and twice SAMPLE_TOLERANCE of its standard deviation along the first axis of
@@ -274,7 +275,7 @@ def _least_tolerance(multibody, i, j, turning, t, margin, work):
 
 
 @device
-def right_time(multibody, spread, i, j, t, sampling, work):
+def right_time(multibody: Any, spread: Any, i: int, j: int, t: float, sampling: Sampling, work: Any) -> float:
     """Time (s) at which unknown accelerations are right: that of the stated first contact, t, or the horizon if t is 0.
 
     Bodies touch where they meet first, and their origins may be closest long after that. t if there are none.
@@ -294,13 +295,13 @@ def right_time(multibody, spread, i, j, t, sampling, work):
 
 
 @inlined
-def spins_far(A, B, horizon):
+def spins_far(A: Any, B: Any, horizon: float) -> bool:
     """Whether two bodies spin by more than FAR within the horizon (s)."""
     return (spin_rate(A) + spin_rate(B)) * horizon > FAR
 
 
 @device
-def _set_unit_turns(t, turning, yaw_only, work, sides):
+def _set_unit_turns(t: float, turning: Any, yaw_only: Any, work: Any, sides: Any) -> None:
     """Write the rotation vectors of both bodies at time t for unit errors of orientation at t into sides.turns."""
     for side in range(2):
         for r in range(3):
@@ -311,7 +312,7 @@ def _set_unit_turns(t, turning, yaw_only, work, sides):
 
 
 @device
-def _set_mirror(multibody, i, j, t, turning, yaw_only, work, sides):
+def _set_mirror(multibody: Any, i: int, j: int, t: float, turning: Any, yaw_only: Any, work: Any, sides: Any) -> None:
     """Write the vector that mirrors the first coordinate onto the errors that narrow the gap at time t most.
 
     sides.widening[0] becomes a unit vector, see `_mirrored`, or 0 if it is the first coordinate already. With few
@@ -331,7 +332,7 @@ def _set_mirror(multibody, i, j, t, turning, yaw_only, work, sides):
 
 
 @device
-def _length(v):
+def _length(v: Any) -> float:
     """Length of a vector (DIMENSIONS,)."""
     total = 0.0
     for c in range(DIMENSIONS):
@@ -340,7 +341,7 @@ def _length(v):
 
 
 @inlined
-def _mirrored(z, mirror, out):
+def _mirrored(z: Any, mirror: Any, out: Any) -> None:
     """Write the errors z (DIMENSIONS,) into out, mirrored at the plane with the normal `mirror` (Householder)."""
     along = 0.0
     for c in range(DIMENSIONS):
@@ -350,7 +351,10 @@ def _mirrored(z, mirror, out):
 
 
 @device
-def _set_sides(multibody, i, j, t, turning, yaw_only, times, first, sampling, work, sides):
+def _set_sides(
+    multibody: Any, i: int, j: int, t: float, turning: Any, yaw_only: Any, times: Any, first: int, sampling: Sampling,
+    work: Any, sides: Any,
+) -> None:  # fmt: skip
     """Find out from the times (S,) of the first samples what foretells those of the others; see `predict_outcome`.
 
     The motions are the stated ones, t the time (s) that matters most, turning the errors of orientation, and yaw_only
@@ -377,7 +381,7 @@ def _set_sides(multibody, i, j, t, turning, yaw_only, times, first, sampling, wo
 
 
 @inlined
-def _rank_of(value, firsts):
+def _rank_of(value: float, firsts: Any) -> int:
     """Rank of the largest of some numbers (n,) that is at most the value; 0 for none."""
     rank = -1
     for m in range(firsts.size):
@@ -386,7 +390,7 @@ def _rank_of(value, firsts):
 
 
 @inlined
-def _unit(z, first, level):
+def _unit(z: Any, first: int, level: float) -> Vector:
     """Three unit errors of orientation of a sample; level: 0.0 if they are about the z axis alone, else 1.0."""
     return level * z[first], level * z[first + 1], z[first + 2]
 
@@ -410,7 +414,9 @@ class Sampling(NamedTuple):
 
 
 @allocating_kernel
-def impact_probabilities(multibody, spread, pairs, now, sampling, work, answers):
+def impact_probabilities(
+    multibody: Any, spread: Any, pairs: Any, now: float, sampling: Sampling, work: Any, answers: Any
+) -> int:
     """Write times (s after `now`) and probabilities of impact of pairs (P, 2) of body slots into answers (P, 4).
 
     An answer is NaN if neither body has declared an uncertainty, or if the pair is left out. Pairs that are stated to

@@ -171,7 +171,7 @@ def _box_times(typing_context, blocks_a, place, M, center, move, blocks, block, 
 
 
 @inlined
-def _turned(blocks_a, a, member, reach_a, reach_b, move):
+def _turned(blocks_a: Any, a: int, member: int, reach_a: float, reach_b: float, move: Approach) -> Any:
     """Centre of a box, and a motion of all points of both trees, in the axes of the box."""
     center = blocks_a[a, CENTER, member], blocks_a[a, CENTER + 1, member], blocks_a[a, CENTER + 2, member]
     return turned_back(blocks_a, a, member, center), Approach(
@@ -192,7 +192,10 @@ def _turned(blocks_a, a, member, reach_a, reach_b, move):
 
 
 @device
-def box_times(blocks_a, root_a, place, blocks_b, root_b, b, X, move, out, at):
+def box_times(
+    blocks_a: Any, root_a: int, place: int, blocks_b: Any, root_b: int, b: int, X: Any, move: Approach, out: Any,
+    at: int,
+) -> None:  # fmt: skip
     """Write times until which a box stays apart from the eight boxes of block b to out[at: at + 8] (s).
 
     place: of the box, WIDTH * block + member. root_a, root_b: first blocks of both trees. X: pose of the tree of b in

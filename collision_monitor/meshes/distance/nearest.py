@@ -9,13 +9,13 @@ boxes; where these leave many pairs, also the gaps along the axes of the boxes.
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.geometry.vector import dot, minus, opposite
+from collision_monitor.geometry.vector import Vector, dot, minus, opposite
 from collision_monitor.meshes.boxes import raise_by_gaps, triangle_bounds
 from collision_monitor.meshes.boxes_below import boxes_below, count_of, first_of
 from collision_monitor.meshes.distance.leaf_bounds import farthest_along, least_of_pairs, raise_bounds
@@ -74,7 +74,7 @@ def answer_row() -> NDArray[np.float64]:
 
 
 @inlined
-def triangle_at(blocks, block, k):
+def triangle_at(blocks: Any, block: int, k: int) -> Corners:
     """Triangle k of a block."""
     return Corners(
         (blocks[block, CORNERS, k], blocks[block, CORNERS + 1, k], blocks[block, CORNERS + 2, k]),
@@ -84,13 +84,15 @@ def triangle_at(blocks, block, k):
 
 
 @inlined
-def size_of(blocks, block, member):
+def size_of(blocks: Any, block: int, member: int) -> float:
     """Sum of the half extents of a box (m)."""
     return blocks[block, HALF, member] + blocks[block, HALF + 1, member] + blocks[block, HALF + 2, member]
 
 
 @device
-def push_nearest_last(blocks, block, work, waiting, limit, fixed, fixed_is_a):
+def push_nearest_last(
+    blocks: Any, block: int, work: Any, waiting: int, limit: float, fixed: float, fixed_is_a: bool
+) -> int:
     """Push the pairs of a box and the members of a block with bounds below the limit; return the stack's new length."""
     first = waiting
     bits = boxes_below(limit, work, BOUNDS, blocks, block)
@@ -111,7 +113,7 @@ def push_nearest_last(blocks, block, work, waiting, limit, fixed, fixed_is_a):
 
 
 @inlined
-def opens_b(blocks_a, a, i, child_a, blocks_b, b, j, child_b):
+def opens_b(blocks_a: Any, a: int, i: int, child_a: float, blocks_b: Any, b: int, j: int, child_b: float) -> bool:
     """Whether to open the box of B rather than that of A: the one that is not a leaf, or the larger."""
     if child_b < 0.0:
         return False
@@ -119,14 +121,14 @@ def opens_b(blocks_a, a, i, child_a, blocks_b, b, j, child_b):
 
 
 @inlined
-def _unit(w):
+def _unit(w: Vector) -> Vector:
     """A vector with at most the length 1, in spite of round-off."""
     length = sqrt(dot(w, w)) * (1.0 + 4.0 * EPSILON)
     return w[0] / length, w[1] / length, w[2] / length
 
 
 @inlined
-def _direction(answer, distance):
+def _direction(answer: Any, distance: float) -> Vector:
     """Unit vector between the closest points of an answer; 0 if there is none."""
     if not 0.0 < distance < inf:
         return 0.0, 0.0, 0.0
@@ -135,26 +137,26 @@ def _direction(answer, distance):
 
 
 @inlined
-def toward(blocks_a, a, i, blocks_b, b, j, X):
+def toward(blocks_a: Any, a: int, i: int, blocks_b: Any, b: int, j: int, X: Any) -> Vector:
     """Unit vector from the centre of a box of A to that of a box of B; 0 if they are one point."""
     w = minus(place_point(X, _center(blocks_b, b, j)), _center(blocks_a, a, i))
     return _unit(w) if dot(w, w) > 0.0 else (0.0, 0.0, 0.0)
 
 
 @inlined
-def _center(blocks, block, member):
+def _center(blocks: Any, block: int, member: int) -> Vector:
     """Centre of a box (m)."""
     return blocks[block, CENTER, member], blocks[block, CENTER + 1, member], blocks[block, CENTER + 2, member]
 
 
 @inlined
-def _shift(X, n):
+def _shift(X: Any, n: Vector) -> float:
     """Distance of B's origin from A's along n (m)."""
     return n[0] * X.x + n[1] * X.y + n[2] * X.z
 
 
 @inlined
-def _least(work, at):
+def _least(work: Any, at: int) -> float:
     """Least of eight numbers."""
     least = work[at]
     for k in range(1, WIDTH):
@@ -163,7 +165,9 @@ def _least(work, at):
 
 
 @inlined
-def _bounds_of(blocks_a, a, i, blocks_b, block, X, n, u, limit, work):
+def _bounds_of(
+    blocks_a: Any, a: int, i: int, blocks_b: Any, block: int, X: Any, n: Vector, u: Vector, limit: float, work: Any
+) -> None:
     """Write lower bounds on the squared distances of a box of A from the boxes of a block of B (m^2).
 
     n, u: unit directions from A to B, in A's frame. limit: bounds above it are as good as any (m^2).
@@ -175,7 +179,10 @@ def _bounds_of(blocks_a, a, i, blocks_b, block, X, n, u, limit, work):
 
 
 @device
-def _leaf_pair(blocks_a, a, i, leaf_a, blocks_b, b, j, leaf_b, X, n, best, answer, work):
+def _leaf_pair(
+    blocks_a: Any, a: int, i: int, leaf_a: int, blocks_b: Any, b: int, j: int, leaf_b: int, X: Any, n: Vector,
+    best: float, answer: Any, work: Any,
+) -> float:  # fmt: skip
     """Improve the answer by the triangles of two leaves; return the best distance. a, i and b, j: their boxes.
 
     n: a unit direction from A to B, along which the leaves may be apart. The pair with the least bound is examined; its
@@ -219,7 +226,9 @@ def _leaf_pair(blocks_a, a, i, leaf_a, blocks_b, b, j, leaf_b, X, n, best, answe
 
 
 @device
-def nearest_triangles(blocks_a, root_a, blocks_b, root_b, X, limit, answer, work):
+def nearest_triangles(
+    blocks_a: Any, root_a: int, blocks_b: Any, root_b: int, X: Any, limit: float, answer: Any, work: Any
+) -> float:
     """Write the nearest triangles of two trees to the answer if they are nearer than `limit` (m); return the distance.
 
     blocks_a, root_a: the array of a tree and its block 0 there. X (Placing): pose of B in A's frame. answer: may hold

@@ -11,7 +11,7 @@ from math import inf
 from typing import Any, NamedTuple
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.geometry.vector import along, cross, dot, minus, sum_of_sizes
+from collision_monitor.geometry.vector import Vector, along, cross, dot, minus, sum_of_sizes
 from collision_monitor.tolerances import SAT_ROUND_OFF, SEGMENT_PARALLEL_SIN2
 
 
@@ -32,12 +32,12 @@ class Closest(NamedTuple):
 
 
 @inlined
-def _within(x):
+def _within(x: float) -> float:
     return min(max(x, 0.0), 1.0)
 
 
 @inlined
-def _segments(p, d, q, e):
+def _segments(p: Vector, d: Vector, q: Vector, e: Vector) -> tuple[float, Vector, Vector, Vector]:
     """Closest points of the segments p + s d and q + t e, s and t in [0, 1]; d and e may be 0."""
     r = minus(q, p)
     dd, ee, de = dot(d, d), dot(e, e), dot(d, e)
@@ -56,7 +56,7 @@ def _segments(p, d, q, e):
 
 
 @inlined
-def _is_over(x, S, n, nn):
+def _is_over(x: Vector, S: Corners, n: Vector, nn: float) -> bool:
     """Whether the projection of x onto the plane of the triangle S lies in it; n: normal of any length, nn = n . n."""
     return (
         dot(cross(minus(S.b, S.a), minus(x, S.a)), n) >= 0.0
@@ -66,7 +66,7 @@ def _is_over(x, S, n, nn):
 
 
 @inlined
-def _pierces(x, y, S):
+def _pierces(x: Vector, y: Vector, S: Corners) -> bool:
     """Whether the segment from x to y passes through the triangle S; the ends lie on both sides of its plane."""
     d = minus(y, x)
     a, b, c = minus(S.a, x), minus(S.b, x), minus(S.c, x)
@@ -75,19 +75,19 @@ def _pierces(x, y, S):
 
 
 @inlined
-def normal(S):
+def normal(S: Corners) -> Vector:
     """Normal of a triangle, as long as twice its area."""
     return cross(minus(S.b, S.a), minus(S.c, S.a))
 
 
 @inlined
-def _heights(S, T, n):
+def _heights(S: Corners, T: Corners, n: Vector) -> Vector:
     """Heights of the corners of S above the plane of T, times the length of its normal n."""
     return dot(minus(S.a, T.a), n), dot(minus(S.b, T.a), n), dot(minus(S.c, T.a), n)
 
 
 @inlined
-def _crossing(S, T, h):
+def _crossing(S: Corners, T: Corners, h: Vector) -> tuple[bool, Vector]:
     """Whether an edge of S passes through T, and a point of it there; h: heights of S's corners above T's plane."""
     if h[0] * h[1] <= 0.0 and h[0] != h[1] and _pierces(S.a, S.b, T):
         return True, along(S.a, h[0] / (h[0] - h[1]), minus(S.b, S.a))
@@ -99,12 +99,12 @@ def _crossing(S, T, h):
 
 
 @inlined
-def _all_on_one_side(h):
+def _all_on_one_side(h: Vector) -> bool:
     return (h[0] > 0.0 and h[1] > 0.0 and h[2] > 0.0) or (h[0] < 0.0 and h[1] < 0.0 and h[2] < 0.0)
 
 
 @device
-def crossing_point(S, T):
+def crossing_point(S: Corners, T: Corners) -> tuple[bool, Vector]:
     """Whether an edge of either triangle passes through the other, and a point of both (m)."""
     n, m = normal(S), normal(T)
     h = _heights(S, T, m)
@@ -120,13 +120,13 @@ def crossing_point(S, T):
 
 
 @inlined
-def corner(S, k):
+def corner(S: Corners, k: int) -> Vector:
     """Corner k of a triangle."""
     return S.a if k == 0 else (S.b if k == 1 else S.c)
 
 
 @device
-def closest_triangle_points(S, T):
+def closest_triangle_points(S: Any, T: Any) -> Any:
     """Closest points of two triangles (Closest)."""
     best, on_s, on_t = inf, S.a, T.a
     for i in range(3):
@@ -150,9 +150,9 @@ def closest_triangle_points(S, T):
     g, h = _heights(T, S, n), _heights(S, T, m)
     for k in range(3):
         x, y = corner(S, k), corner(T, k)
-        up, over = g[k], h[k]
-        if nn > 0.0 and up * up < best * nn and _is_over(y, S, n, nn):
-            best, on_s, on_t = up * up / nn, along(y, -up / nn, n), y
+        high, over = g[k], h[k]
+        if nn > 0.0 and high * high < best * nn and _is_over(y, S, n, nn):
+            best, on_s, on_t = high * high / nn, along(y, -high / nn, n), y
         if mm > 0.0 and over * over < best * mm and _is_over(x, T, m, mm):
             best, on_s, on_t = over * over / mm, x, along(x, -over / mm, m)
     if not (_all_on_one_side(g) or _all_on_one_side(h)):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import copysign, sqrt
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -20,7 +20,10 @@ CONTAINED: Final = 64 * EPSILON
 
 
 @device
-def fit_box(corners, radius, order, begin, end, axes, half, center, reach, blocks, block, member):
+def fit_box(
+    corners: Any, radius: Any, order: Any, begin: int, end: int, axes: Any, half: Any, center: Any, reach: Any,
+    blocks: Any, block: int, member: int,
+) -> None:  # fmt: skip
     """Write the box around the triangles order[begin:end], which are enlarged by radii, to a member of a block.
 
     axes (2, 3, 3), half, center (2, 3), reach (REACHES,): scratch memory.
@@ -87,7 +90,7 @@ def fit_box(corners, radius, order, begin, end, axes, half, center, reach, block
 
 
 @device
-def _principal_axes(xx, xy, xz, yy, yz, zz, R):
+def _principal_axes(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float, R: Any) -> None:
     """Write the eigenvectors of a symmetric matrix into the columns of R (3, 3), by Jacobi rotations."""
     for r in range(3):
         for c in range(3):

@@ -11,7 +11,7 @@ import os
 from concurrent.futures import ThreadPoolExecutor
 from hashlib import blake2b
 from math import sqrt
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,7 +116,7 @@ _number_of_blocks: Final = inlined(_blocks_of)
 
 
 @kernel
-def _measure(corners, radius, middle):
+def _measure(corners: Any, radius: Any, middle: Any) -> float:
     """Write the centres of the triangles; return the largest distance of a point from the origin (m)."""
     far = 0.0
     for k in range(len(corners)):
@@ -131,7 +131,7 @@ def _measure(corners, radius, middle):
 
 
 @allocating_kernel
-def _grow(corners, radius, middle, order, blocks, stack, waiting, steps):
+def _grow(corners: Any, radius: Any, middle: Any, order: Any, blocks: Any, stack: Any, waiting: int, steps: int) -> int:
     """Write the parts that wait on a stack, and those below, `steps` at most; return how many wait.
 
     A part: begin and end in the order, block and member for its box, and its first block.
@@ -154,7 +154,7 @@ def _grow(corners, radius, middle, order, blocks, stack, waiting, steps):
 
 
 @device
-def _write_leaf(corners, radius, order, begin, end, blocks, block):
+def _write_leaf(corners: Any, radius: Any, order: Any, begin: int, end: int, blocks: Any, block: int) -> None:
     """Write a block of triangles."""
     blocks[block] = 0.0
     for lane in range(WIDTH):
@@ -167,7 +167,9 @@ def _write_leaf(corners, radius, order, begin, end, blocks, block):
 
 
 @device
-def _push_parts(corners, middle, order, begin, end, block, stack, first, some):
+def _push_parts(
+    corners: Any, middle: Any, order: Any, begin: int, end: int, block: int, stack: Any, first: int, some: Any
+) -> int:
     """Divide the triangles of a block into its parts; push them from `first` on, return the stack's new length."""
     unit = WIDTH
     while end - begin > WIDTH * unit:
@@ -193,7 +195,7 @@ def _push_parts(corners, middle, order, begin, end, block, stack, first, some):
 
 
 @device
-def _halve(corners, middle, order, begin, end, unit, some):
+def _halve(corners: Any, middle: Any, order: Any, begin: int, end: int, unit: int, some: Any) -> int:
     """Sort the order so that the first half lies below the second along `_best_axis`; return where that begins.
 
     The first half fills whole parts of `unit` triangles.
@@ -209,7 +211,7 @@ def _halve(corners, middle, order, begin, end, unit, some):
 
 
 @device
-def _best_axis(corners, middle, some, count, cut):
+def _best_axis(corners: Any, middle: Any, some: Any, count: int, cut: int) -> int:
     """The axis along which the boxes around both halves have the least surface, weighted by their triangles.
 
     (Goldsmith, Salmon, Automatic creation of object hierarchies for ray tracing, 1987: the surface area heuristic)
@@ -224,7 +226,7 @@ def _best_axis(corners, middle, some, count, cut):
 
 
 @device
-def _surface(corners, order, begin, end):
+def _surface(corners: Any, order: Any, begin: int, end: int) -> float:
     """An eighth of the surface of the axis-aligned box around triangles (m^2)."""
     x, y, z = corners[order[begin], 0, 0], corners[order[begin], 0, 1], corners[order[begin], 0, 2]
     low_x, low_y, low_z, high_x, high_y, high_z = x, y, z, x, y, z
@@ -238,7 +240,7 @@ def _surface(corners, order, begin, end):
 
 
 @device
-def _sort_about(middle, order, begin, end, cut, axis):
+def _sort_about(middle: Any, order: Any, begin: int, end: int, cut: int, axis: int) -> None:
     """Sort the order so that the part before the cut lies below the rest. (Quickselect: Hoare, 1961)"""
     first, last = begin, end - 1
     while first < last:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import inlined
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.impact.body_contact import RESULT, STATUS, TOUCHING, closing_now, relative_now, widening
 from collision_monitor.impact.body_impact import CLOSING
 from collision_monitor.impact.mesh_pair import has_mesh
@@ -67,19 +68,19 @@ def saved(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 @inlined
-def has_answer(row):
+def has_answer(row: Any) -> bool:
     """Whether there is an answer to carry in a carried row."""
     return row[DISTANCE] == row[DISTANCE]
 
 
 @inlined
-def _turn_now(bodies, i, now, q):
+def _turn_now(bodies: Any, i: int, now: float, q: Any) -> None:
     wx, wy, wz = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
     turn_quaternion(bodies.quaternion, i, wx, wy, wz, age_of(bodies, i, now), q)
 
 
 @inlined
-def _turned(bodies, i, now, row, at, q):
+def _turned(bodies: Any, i: int, now: float, row: Any, at: int, q: Any) -> float:
     """Distance (m) that the surface of body i has turned since the answer. q (4,): scratch."""
     radius = bodies.spin_radius[i]
     if radius == 0.0:
@@ -90,7 +91,9 @@ def _turned(bodies, i, now, row, at, q):
 
 
 @inlined
-def carry_contact(multibody, i, j, now, query, tolerance, scratch, row, result):
+def carry_contact(
+    multibody: Any, i: int, j: int, now: float, query: Any, tolerance: float, scratch: Any, row: Any, result: Any
+) -> bool:
     """Write the contact of bodies i and j into a result row, from their carried row, if that still holds.
 
     query: ContactQuery. tolerance: largest error (m) that this may add. Returns whether it holds.
@@ -127,7 +130,7 @@ def carry_contact(multibody, i, j, now, query, tolerance, scratch, row, result):
 
 
 @inlined
-def _is_convex(multibody, i):
+def _is_convex(multibody: Any, i: int) -> bool:
     """Whether all shapes of body i are convex, and are the object itself."""
     table, parts, bodies = multibody
     convex = not bodies.concave[i]
@@ -139,7 +142,7 @@ def _is_convex(multibody, i):
 
 
 @inlined
-def _outlasts(bodies, i, j, v, n, carrying):
+def _outlasts(bodies: Any, i: int, j: int, v: Vector, n: Any, carrying: Carrying) -> bool:
     """Whether an answer with normal n of bodies with relative velocity v (m/s) will hold after one more period."""
     along = v[0] * n[0] + v[1] * n[1] + v[2] * n[2]
     half = 0.5 * (sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) - along)
@@ -147,7 +150,10 @@ def _outlasts(bodies, i, j, v, n, carrying):
 
 
 @inlined
-def keep(multibody, i, j, touching, now, query, carrying, scratch, result, row, spread):
+def keep(
+    multibody: Any, i: int, j: int, touching: bool, now: float, query: Any, carrying: Carrying, scratch: Any,
+    result: Any, row: Any, spread: float,
+) -> None:  # fmt: skip
     """Write the carried row of bodies i and j from their result row, if that may be carried.
 
     spread: by how much the distance of the deepest triangles may differ (m), of two meshes.

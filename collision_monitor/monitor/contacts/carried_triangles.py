@@ -10,10 +10,10 @@ triangles that meet takes much longer.
 from __future__ import annotations
 
 from math import sqrt
-from typing import Final
+from typing import Any, Final
 
 from collision_monitor._jit import device, inlined, outlined
-from collision_monitor.geometry.vector import dot, opposite, rotate_back
+from collision_monitor.geometry.vector import Vector, dot, opposite, rotate_back
 from collision_monitor.impact.body_contact import (
     RESULT,
     SHAPE_I,
@@ -63,13 +63,13 @@ APART: Final = -2.0
 
 
 @inlined
-def has_one_shape(multibody, i):
+def has_one_shape(multibody: Any, i: int) -> bool:
     """Whether body i is one shape."""
     return multibody.parts.next[multibody.bodies.first_shape[i]] < 0
 
 
 @inlined
-def meets_by_trees(multibody, i, j):
+def meets_by_trees(multibody: Any, i: int, j: int) -> bool:
     """Whether bodies i and j are one shape each, no models of objects, that meet by trees, one of them a mesh."""
     table, bodies = multibody.table, multibody.bodies
     a, b = bodies.first_shape[i], bodies.first_shape[j]
@@ -79,7 +79,7 @@ def meets_by_trees(multibody, i, j):
 
 
 @device
-def _meet(table, a, b, pose, row, scratch):
+def _meet(table: Any, a: int, b: int, pose: PairPose, row: Any, scratch: Any) -> bool:
     """Write the contact of two triangles that meet into scratch.out: those of the row, or others, noted there.
 
     Returns whether there are any.
@@ -99,7 +99,7 @@ def _meet(table, a, b, pose, row, scratch):
 
 
 @inlined
-def placed_shapes(multibody, i, j, now, there, scratch):
+def placed_shapes(multibody: Any, i: int, j: int, now: float, there: Any, scratch: Any) -> Any:
     """Offset of the shape of body i from its origin in world axes, and the pose of the pair of shapes at `now` (s)."""
     table, parts, bodies = multibody
     a, b = bodies.first_shape[i], bodies.first_shape[j]
@@ -111,7 +111,7 @@ def placed_shapes(multibody, i, j, now, there, scratch):
 
 
 @inlined
-def reach_of_tree(table, s, R, n):
+def reach_of_tree(table: Any, s: int, R: Any, n: Vector) -> float:
     """How far the box of a whole tree reaches from its shape's origin along n (m). R: rotation of the shape."""
     blocks, root, d = table.blocks, root_of(table, s), rotate_back(R, n)
     m, e = turned_back(blocks, root, 0, d), half_of(blocks, root, 0)
@@ -120,7 +120,9 @@ def reach_of_tree(table, s, R, n):
 
 
 @device
-def _write(multibody, i, j, there, placed, known, query, out, result):
+def _write(
+    multibody: Any, i: int, j: int, there: Any, placed: Any, known: Any, query: Any, out: Any, result: Any
+) -> float:
     """Write a contact of triangles (`out`) into a result row; the deepest ones have a distance in known (m, m).
 
     A translation along the normal that parts both solids may be longer than the depth; the bound holds that of their
@@ -148,7 +150,10 @@ def _write(multibody, i, j, there, placed, known, query, out, result):
 
 
 @device
-def carry_triangles(multibody, i, j, now, there, moved, query, tolerance, scratch, row, result):
+def carry_triangles(
+    multibody: Any, i: int, j: int, now: float, there: Any, moved: float, query: Any, tolerance: float, scratch: Any,
+    row: Any, result: Any,
+) -> bool:  # fmt: skip
     """Write the contact of bodies i and j at `now` (s) into a result row, from their carried row, if triangles meet.
 
     there: the bodies (Now). moved (m): how far a surface can have moved relative to the other since the answer.
@@ -168,14 +173,14 @@ def carry_triangles(multibody, i, j, now, there, moved, query, tolerance, scratc
 
 
 @inlined
-def turning(bodies, i):
+def turning(bodies: Any, i: int) -> float:
     """Speed (m/s) at which the surface of body i turns."""
     x, y, z = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
     return bodies.spin_radius[i] * sqrt(x * x + y * y + z * z)
 
 
 @inlined
-def lasts(bodies, i, j, v, carrying):
+def lasts(bodies: Any, i: int, j: int, v: Vector, carrying: Any) -> bool:
     """Whether to carry the contact of bodies over that have the relative velocity v (m/s).
 
     They have to move by less than the tolerance until the next step. If the tolerance is not small beside their
@@ -187,7 +192,7 @@ def lasts(bodies, i, j, v, carrying):
 
 
 @inlined
-def apart_or_none(multibody, a, b, pose, there, query, scratch):
+def apart_or_none(multibody: Any, a: int, b: int, pose: PairPose, there: Any, query: Any, scratch: Any) -> float:
     """APART if two shapes with surfaces that do not meet do not touch either; else NONE."""
     if query.margin + widening(there, query.stale_acceleration) > 0.0:
         return NONE
@@ -195,7 +200,9 @@ def apart_or_none(multibody, a, b, pose, there, query, scratch):
 
 
 @outlined
-def overlap_of_trees(multibody, i, j, now, query, carrying, scratch, result):
+def overlap_of_trees(
+    multibody: Any, i: int, j: int, now: float, query: Any, carrying: Any, scratch: Any, result: Any
+) -> float:
     """Write the contact of bodies i and j at `now` (s) into a result row, if triangles of both meet.
 
     The search for the deepest triangles ends when the depth is known within the tolerance, or within a quarter of it if

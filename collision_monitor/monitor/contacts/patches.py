@@ -38,7 +38,7 @@ SHAPE_PAIR = np.dtype(
 
 
 @kernel
-def _shape_pairs(multibody, active, now, scratch, found):
+def _shape_pairs(multibody: Multibody, active: Active, now: float, scratch: Any, found: Any) -> int:
     """Find the pairs of shapes of each settled contact whose bounding spheres are at least as near as the contact.
 
     Written into found (m,) SHAPE_PAIR; returns their number. If it exceeds m, the rest is only counted.
@@ -103,7 +103,7 @@ class _Points(NamedTuple):
 
 
 @allocating_kernel
-def _join(bodies, active, now, patches, most, points, work):
+def _join(bodies: Any, active: Active, now: float, patches: _Patches, most: int, points: _Points, work: Any) -> None:
     """Join the patches of the shapes of each active pair into its points, at most `most` of them."""
     pairs, _, results, _ = active
     of, tie = patches.of, patches.tie

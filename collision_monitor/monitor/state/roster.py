@@ -415,7 +415,9 @@ def _check_chains(bodies: BodyTable, parts: Parts, kind: NDArray[Any]) -> None:
 
 
 @kernel
-def count_bodies(used, static, seen, time, count, now, stale_after):
+def count_bodies(
+    used: Any, static: Any, seen: Any, time: Any, count: int, now: float, stale_after: float
+) -> tuple[int, int, int]:
     """Count the static, the unseen and the stale bodies in the first `count` slots of these columns of Bodies.
 
     Unseen: without any state. Stale: not static, and the last state is older than stale_after (s).

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import threading
 from math import inf
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import kernel, outlined
 from collision_monitor._jit.settled import settled
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.impact.body_contact import RESULT, ROUND_OFF, chains_contact, chains_overlap
 from collision_monitor.impact.body_impact import Scratch, make_scratch
 from collision_monitor.motion.bodies import Parts, chain_radius
@@ -40,10 +41,12 @@ MEMORY: Final = QueryMemory()
 @settled
 @kernel
 def contact_of_chains(
-    kind, size, margin, radius, vertex_start, vertex_count, vertices, vertex_index, local_position, local_rotation,
-    blocks, next_part, index, placed, rotation, quaternion, out, work, tree, answer, triangle,
-    a, ax, ay, az, ai, aj, ak, aw, b, bx, by, bz, bi, bj, bk, bw, limit, effort, row,
-):  # fmt: skip
+    kind: Any, size: Any, margin: Any, radius: Any, vertex_start: Any, vertex_count: Any, vertices: Any,
+    vertex_index: Any, local_position: Any, local_rotation: Any, blocks: Any, next_part: Any, index: Any, placed: Any,
+    rotation: Any, quaternion: Any, out: Any, work: Any, tree: Any, answer: Any, triangle: Any, a: int, ax: float,
+    ay: float, az: float, ai: float, aj: float, ak: float, aw: float, b: int, bx: float, by: float, bz: float,
+    bi: float, bj: float, bk: float, bw: float, limit: float, effort: int, row: Any,
+) -> tuple[float, float]:  # fmt: skip
     """Write the contact of two chains of slots to a row (RESULT,); return the distance and its bound (m).
 
     A pose is x, y, z and a unit quaternion. The distance is infinite, without a contact, beyond the limit (m).
@@ -63,7 +66,10 @@ def contact_of_chains(
 
 
 @kernel
-def contacts_of_chains(table, parts, scratch, firsts_a, x_a, firsts_b, x_b, effort, rows):
+def contacts_of_chains(
+    table: ShapeTable, parts: Parts, scratch: Scratch, firsts_a: Any, x_a: Any, firsts_b: Any, x_b: Any, effort: int,
+    rows: Any,
+) -> None:  # fmt: skip
     """Write the contacts of N pairs to rows (N, RESULT). firsts (N,) or (1,): slots; x (N, 7) or (1, 7): poses.
 
     A negative slot leaves its pair out.
@@ -81,7 +87,10 @@ def contacts_of_chains(table, parts, scratch, firsts_a, x_a, firsts_b, x_b, effo
 
 
 @outlined
-def _contact(table, parts, chains, origin, p, limit, effort, scratch, row):
+def _contact(
+    table: ShapeTable, parts: Parts, chains: Any, origin: Vector, p: Vector, limit: float, effort: int,
+    scratch: Scratch, row: Any,
+) -> tuple[float, float]:  # fmt: skip
     """Write the contact of two chains (first slots) to a row, with points in the world; return distance and bound (m).
 
     origin, p: position of the first one, and of the second one relative to it. Their rotations are in the scratch.
@@ -101,10 +110,12 @@ def _contact(table, parts, chains, origin, p, limit, effort, scratch, row):
 @settled
 @kernel
 def overlap_of_chains(
-    kind, size, margin, radius, vertex_start, vertex_count, vertices, vertex_index, local_position, local_rotation,
-    blocks, next_part, index, placed, rotation, quaternion, out, work, tree, answer, triangle,
-    a, ax, ay, az, ai, aj, ak, aw, b, bx, by, bz, bi, bj, bk, bw,
-):  # fmt: skip
+    kind: Any, size: Any, margin: Any, radius: Any, vertex_start: Any, vertex_count: Any, vertices: Any,
+    vertex_index: Any, local_position: Any, local_rotation: Any, blocks: Any, next_part: Any, index: Any, placed: Any,
+    rotation: Any, quaternion: Any, out: Any, work: Any, tree: Any, answer: Any, triangle: Any, a: int, ax: float,
+    ay: float, az: float, ai: float, aj: float, ak: float, aw: float, b: int, bx: float, by: float, bz: float,
+    bi: float, bj: float, bk: float, bw: float,
+) -> bool:  # fmt: skip
     """Whether two chains of slots have a point in common. Arguments as for `contact_of_chains`."""
     table = ShapeTable(
         kind, size, margin, radius, vertex_start, vertex_count, vertices, vertex_index, local_position, local_rotation,

@@ -113,12 +113,15 @@ def set_motion(m: Any, numbers: Any, k: int) -> None:
 @settled
 @kernel
 def impact_of_chains(
-    kind, size, margin, radius, vertex_start, vertex_count, vertices, vertex_index, local_position, local_rotation,
-    blocks, next_part, index, placed, rotation, quaternion, out, work, tree, answer, triangle, motion, event, row,
-    a, ax, ay, az, ai, aj, ak, aw, avx, avy, avz, awx, awy, awz, aax, aay, aaz,
-    b, bx, by, bz, bi, bj, bk, bw, bvx, bvy, bvz, bwx, bwy, bwz, bax, bay, baz,
-    horizon, tolerance, separation, iterations, begin,
-):  # fmt: skip
+    kind: Any, size: Any, margin: Any, radius: Any, vertex_start: Any, vertex_count: Any, vertices: Any,
+    vertex_index: Any, local_position: Any, local_rotation: Any, blocks: Any, next_part: Any, index: Any, placed: Any,
+    rotation: Any, quaternion: Any, out: Any, work: Any, tree: Any, answer: Any, triangle: Any, motion: Any,
+    event: Any, row: Any, a: int, ax: float, ay: float, az: float, ai: float, aj: float, ak: float, aw: float,
+    avx: float, avy: float, avz: float, awx: float, awy: float, awz: float, aax: float, aay: float, aaz: float, b: int,
+    bx: float, by: float, bz: float, bi: float, bj: float, bk: float, bw: float, bvx: float, bvy: float, bvz: float,
+    bwx: float, bwy: float, bwz: float, bax: float, bay: float, baz: float, horizon: float, tolerance: float,
+    separation: float, iterations: int, begin: float,
+) -> tuple[float, float, int]:  # fmt: skip
     """First impact of two moving chains of slots: lower, upper (s), infinite for none; DECIDED or TOUCHES.
 
     A motion is a pose, a linear and an angular velocity and an acceleration, in the world. begin: time (s) before which
@@ -151,7 +154,10 @@ def set_pair(table: Any, parts: Any, chains: Any, motion: Any, motions_a: Any, i
 
 
 @kernel
-def impacts_of_chains(table, parts, scratch, moving, firsts_a, motions_a, firsts_b, motions_b, query, rows):
+def impacts_of_chains(
+    table: ShapeTable, parts: Parts, scratch: Scratch, moving: Any, firsts_a: Any, motions_a: Any, firsts_b: Any,
+    motions_b: Any, query: Any, rows: Any,
+) -> None:  # fmt: skip
     """Write lower, upper (s) and code of N pairs to rows (N, 3).
 
     firsts (N,) or (1,): slots; a negative one leaves its pair out. motions (N, 16) or (1, 16). query (4,): of
@@ -167,7 +173,9 @@ def impacts_of_chains(table, parts, scratch, moving, firsts_a, motions_a, firsts
 
 
 @kernel
-def touching_chains(table, parts, scratch, motion, chains, numbers, slots, query):
+def touching_chains(
+    table: ShapeTable, parts: Parts, scratch: Scratch, motion: Any, chains: Any, numbers: Any, slots: Any, query: Any
+) -> tuple[float, float]:
     """First impact of all pairs of slots of two objects that touch at the start: lower, upper (s), infinite for none.
 
     chains: their own first slots. numbers (2, 16): their motions. slots: those of their pieces (n,) and (m,). query:
@@ -209,7 +217,9 @@ def touching_chains(table, parts, scratch, motion, chains, numbers, slots, query
 
 
 @kernel
-def certain_overlap_of_chains(table, parts, scratch, motion, chains, numbers, query):
+def certain_overlap_of_chains(
+    table: ShapeTable, parts: Parts, scratch: Scratch, motion: Any, chains: Any, numbers: Any, query: Any
+) -> float:
     """Least `overlap_time` (s) within the horizon of the pairs of two chains; infinite: none found.
 
     Arguments: as above. Only for meshes; it finds overlaps where no triangles cross because they lie in one plane.

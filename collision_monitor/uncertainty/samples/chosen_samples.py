@@ -8,7 +8,7 @@ beyond these ranks end as the pilot does, so that the first ones stand for them,
 from __future__ import annotations
 
 from math import inf
-from typing import Final
+from typing import Any, Final
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.uncertainty.samples.normal_samples import BASE
@@ -19,7 +19,7 @@ SPARE: Final = 12
 
 
 @inlined
-def open_ranks(times, order, spare):
+def open_ranks(times: Any, order: Any, spare: int) -> tuple[int, int, int, int]:
     """Ranks (4,) of the pilot at which both parts with both outcomes begin and end, at the ends of the longest run.
 
     order (pilot,): sorts the pilot's times by the first coordinate; spare: see SPARE.
@@ -47,7 +47,7 @@ def open_ranks(times, order, spare):
 
 
 @inlined
-def _represent(columns, weights, begin, end):
+def _represent(columns: Any, weights: Any, begin: int, end: int) -> None:
     """Let the first weights (BASE,) of these ranks of the pilot stand for all samples of the ranks."""
     if begin >= end:
         return
@@ -64,7 +64,7 @@ def _represent(columns, weights, begin, end):
 
 
 @device
-def choose_samples(times, columns, used, sampling, careful, chosen):
+def choose_samples(times: Any, columns: Any, used: int, sampling: Any, careful: bool, chosen: Any) -> int:
     """Choose samples (ChosenSamples) for bodies with these times (S,) of the pilot; infinite: they do not meet.
 
     Returns their number. 0: the bodies are stated to pass, and hardly meet in the pilot. The first ones are the pilot.

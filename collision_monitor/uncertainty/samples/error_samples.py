@@ -8,6 +8,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.impact.body_impact import Scratch, make_scratch
 from collision_monitor.motion.motion import MOTION
 from collision_monitor.motion.trigonometry import sin_cos
@@ -55,7 +56,7 @@ def make_workspace() -> Workspace:
 
 
 @device
-def set_frame(frame, vx, vy, vz):
+def set_frame(frame: Any, vx: float, vy: float, vz: float) -> None:
     """Complete the frame (3, 3) whose first row is a direction n. Second row: part of v across n; third: across both.
 
     The rows become unit vectors. If the first row is 0, it becomes a direction across v.
@@ -79,7 +80,7 @@ def set_frame(frame, vx, vy, vz):
 
 
 @inlined
-def _across(x, y, z):
+def _across(x: float, y: float, z: float) -> Vector:
     """Return a horizontal unit vector perpendicular to (x, y, z)."""
     level = sqrt(x * x + y * y)
     if level > 1e-6 * abs(z):
@@ -88,7 +89,9 @@ def _across(x, y, z):
 
 
 @device
-def add_covariance(spread, i, age, t, right, stale_acceleration, planar, work):
+def add_covariance(
+    spread: Any, i: int, age: float, t: float, right: float, stale_acceleration: float, planar: bool, work: Workspace
+) -> None:
     """Add body i's part to work.joint (6, 6): covariance of its position t seconds from now and its velocity.
 
     Both are along the axes of work.frame. age: s since the body's last state. A stale object widens its spread here. An
@@ -124,7 +127,7 @@ def add_covariance(spread, i, age, t, right, stale_acceleration, planar, work):
 
 
 @device
-def take_root(joint):
+def take_root(joint: Any) -> None:
     """Replace a covariance (6, 6), given by its upper triangle, by its lower Cholesky factor, with zeros above it.
 
     A coordinate without variance of its own gets a zero column.
@@ -147,7 +150,7 @@ def take_root(joint):
 
 
 @device
-def turn(m, R, w, off, error, left):
+def turn(m: Any, R: Any, w: Vector, off: Any, error: Vector, left: Vector) -> None:
     """Set rotation and angular velocity of m (MOTION) to R and w (3,), off by unit errors, see `orientation_spread`.
 
     error, left (3,): of the orientation at the time of `off`, and of what is left.
@@ -172,7 +175,9 @@ def turn(m, R, w, off, error, left):
 
 
 @device
-def orientation_spread(spread, i, radius, age, t, right):
+def orientation_spread(
+    spread: Any, i: int, radius: float, age: float, t: float, right: float
+) -> tuple[float, float, float, float]:
     """Errors of body i's orientation for two unit errors: (rad now, rad/s, rad now, rad/s), the last two independent.
 
     The first one is that of the orientation t seconds from now, with its likeliest way there; the second is what is
@@ -196,13 +201,13 @@ def orientation_spread(spread, i, radius, age, t, right):
 
 
 @inlined
-def errors_turn(off):
+def errors_turn(off: Any) -> bool:
     """Whether errors turn a body; off: orientation_spread."""
     return off[0] + off[1] + off[3] > 0.0
 
 
 @device
-def set_turn(m, t, off, yaw_only, out):
+def set_turn(m: Any, t: float, off: Any, yaw_only: bool, out: Any) -> None:
     """Write the matrix (3, 3) that maps a unit error to the rotation vector (rad) of motion m's error at time t.
 
     off: error of orientation at time 0 (rad) and of the angular velocity (rad/s), about all axes or, if yaw_only, about
@@ -232,7 +237,7 @@ def set_turn(m, t, off, yaw_only, out):
 
 
 @device
-def shift(work, z, t, p, v):
+def shift(work: Workspace, z: Any, t: float, p: Vector, v: Vector) -> None:
     """Move body j by sample z (DIMENSIONS,): its velocity is v + the error, its position p + the error at t."""
     B, L, F, y = work.motion[1], work.joint, work.frame, work.block
     for r in range(6):

@@ -8,7 +8,7 @@ search begins at that time.
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Final
+from typing import Any, Final
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.motion.bodies import place_shape
@@ -20,7 +20,7 @@ AXES: Final = 8
 
 
 @device
-def remember(table, parts, pair, passed, n, scratch, axes):
+def remember(table: Any, parts: Any, pair: Any, passed: bool, n: int, scratch: Any, axes: Any) -> None:
     """Store the direction in scratch.out as one of the axes (AXES, 4) of a pair of shapes (ShapePair).
 
     n: index of the sample, which selects the axis to replace; passed: whether the sample passed. Behind one whose
@@ -52,7 +52,7 @@ def remember(table, parts, pair, passed, n, scratch, axes):
 
 
 @inlined
-def parted_until(axes, A, B, end, wanted):
+def parted_until(axes: Any, A: Any, B: Any, end: float, wanted: float) -> float:
     """Return a time (s) until which the gap is larger than `wanted` (m); infinite: until `end`."""
     px, py, pz = B.x - A.x, B.y - A.y, B.z - A.z
     vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz

@@ -6,7 +6,7 @@ the same order.
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.uncertainty.samples.sample_gaps import NOT_TURNED
@@ -16,7 +16,7 @@ FEWEST: Final = 16
 
 
 @inlined
-def place_of(sample, live, count):
+def place_of(sample: int, live: Any, count: int) -> int:
     """Place of a sample among the first `count` live ones (S,); -1: it is not one of them."""
     low, high = 0, count
     while low < high:
@@ -29,7 +29,7 @@ def place_of(sample, live, count):
 
 
 @device
-def drop_missed(count, at, turning, memory):
+def drop_missed(count: int, at: int, turning: Any, memory: Any) -> tuple[int, int]:
     """Drop the live samples that miss, if at most half of the first `count` ones may still meet.
 
     turning: see `set_samples`. Returns the number of those that are left, and the new place of the sample at place

@@ -44,7 +44,7 @@ PILOT: Final = 128
 
 
 @inlined
-def pilot_of(count):
+def pilot_of(count: int) -> int:
     """Number of samples in the pilot of `count`: PILOT or up to twice as many, an equal part of all if possible."""
     return -(-count // max(1, count // PILOT))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import inf
-from typing import Final
+from typing import Any, Final
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.uncertainty.samples.normal_samples import BASE
@@ -18,7 +18,7 @@ it."""
 
 
 @inlined
-def latest(times, count):
+def latest(times: Any, count: int) -> float:
     """Latest of the first `count` times (s); infinite if one of the samples does not meet."""
     last = 0.0
     for n in range(count):
@@ -27,7 +27,7 @@ def latest(times, count):
 
 
 @device
-def samples_needed(times, columns, sampling, careful):
+def samples_needed(times: Any, columns: Any, sampling: Any, careful: bool) -> int:
     """Number of samples for bodies with these times (S,) of the pilot's samples; infinite: they do not meet.
 
     0: the bodies are stated to pass, and hardly meet in the pilot. BASE: they meet in all of it.

@@ -19,6 +19,7 @@ import numpy as np
 from numpy import float32
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.narrow_phase.core import rounding
 from collision_monitor.shapes.calls import core_support
 from collision_monitor.shapes.kinds.box import BOX
@@ -78,7 +79,7 @@ def make_sample_rows(samples: int) -> SampleRows:
 
 
 @inlined
-def _is_zero(matrix):
+def _is_zero(matrix: Any) -> bool:
     """Whether all numbers of a matrix (3, 3) are 0."""
     total = 0.0
     for r in range(3):
@@ -88,7 +89,9 @@ def _is_zero(matrix):
 
 
 @device
-def set_samples(obstacle, k, off, points, turning, first, last, rows):
+def set_samples(
+    obstacle: Any, k: int, off: Any, points: Any, turning: Any, first: int, last: int, rows: SampleRows
+) -> None:
     """Write the samples first:last at both ends and in the middle of segment k into rows.node.
 
     off (6, S): errors of position and velocity; points (DIMENSIONS, S): unit errors;
@@ -134,7 +137,7 @@ def set_samples(obstacle, k, off, points, turning, first, last, rows):
 
 
 @device
-def _turn(vectors, by, row, sign, order, first, last):
+def _turn(vectors: Any, by: Any, row: Any, sign: Any, order: Any, first: Any, last: Any) -> None:
     """Turn vectors (3, S) by sign (-1 or 1) times the rotation vectors in three rows of `by`, from `row` on.
 
     Only samples first:last. order: FIRST_ORDER, or SERIES for sine and cosine, see TURNED_FARTHEST.
@@ -161,7 +164,7 @@ def _turn(vectors, by, row, sign, order, first, last):
 
 
 @inlined
-def core_reach(table, s, R, o, n):
+def core_reach(table: Any, s: int, R: Any, o: Any, n: Vector) -> float:
     """Support value (m) about its body's origin of the core of shape s, with rotation R and offset o (3,)."""
     if table.kind[s] == HALF_SPACE:
         return table.size[s, 3]
@@ -176,7 +179,7 @@ def core_reach(table, s, R, o, n):
 
 
 @inlined
-def stated_gap(table, pair, n, node, margin):
+def stated_gap(table: Any, pair: Any, n: Vector, node: Any, margin: float) -> float:
     """Gap (m) beyond the margin of the stated motion along the unit vector n (3,), in world axes, at a node (NODE)."""
     a, b = pair.a, pair.b
     p, R, o = node.position, node.rotation, node.offset
@@ -185,7 +188,9 @@ def stated_gap(table, pair, n, node, margin):
 
 
 @inlined
-def _subtract_reaches(table, s, R, o, sign, local, gap, first, last, best):
+def _subtract_reaches(
+    table: Any, s: Any, R: Any, o: Any, sign: Any, local: Any, gap: Any, first: Any, last: Any, best: Any
+) -> None:
     """Subtract `core_reach` along sign times the directions local (3, S), in world axes, from gap (last - first,).
 
     Only samples first:last. Overwrites local. best (last - first,): scratch.
@@ -228,7 +233,10 @@ def _subtract_reaches(table, s, R, o, sign, local, gap, first, last, best):
 
 
 @inlined
-def _gaps_at(table, pair, plane, node, margin, turning, first, last, state, rows, gap):
+def _gaps_at(
+    table: Any, pair: Any, plane: Any, node: Any, margin: Any, turning: Any, first: Any, last: Any, state: Any,
+    rows: Any, gap: Any,
+) -> None:  # fmt: skip
     """Write the gaps (last - first,) of samples along a plane at a node (NODE); state (STATE, S): the samples there."""
     a, b, mode = pair.a, pair.b, int(plane[MODE])
     R, o, p = node.rotation, node.offset, node.position
@@ -281,13 +289,15 @@ def _gaps_at(table, pair, plane, node, margin, turning, first, last, state, rows
 
 
 @device
-def gaps_at_begin(table, pair, plane, margin, turning, node, count, rows):
+def gaps_at_begin(
+    table: Any, pair: Any, plane: Any, margin: float, turning: Any, node: Any, count: int, rows: SampleRows
+) -> None:
     """Write the gaps of the first `count` samples along a plane at the begin of a segment (NODE) into rows.gap[0]."""
     _gaps_at(table, pair, plane, node, margin, turning, 0, count, rows.node[0], rows, rows.gap[0, 0:count])
 
 
 @inlined
-def set_bends(table, pair, plane, nodes, middle, least):
+def set_bends(table: Any, pair: Any, plane: Any, nodes: Any, middle: Any, least: float) -> None:
     """Set column BENDS of a plane in a segment with these ends and this middle (NODE).
 
     Gaps count as straight lines if the stated one deviates from a line by at most `least` (m).
@@ -299,7 +309,7 @@ def set_bends(table, pair, plane, nodes, middle, least):
 
 
 @inlined
-def _restrict(n, enters, leaves, entry, leave):
+def _restrict(n: Any, enters: Any, leaves: Any, entry: Any, leave: Any) -> None:
     """Restrict [entry, leave] of sample n. With + ZERO, LLVM stores every lane; to leave some as they are is slower."""
     before, after = entry[n] + ZERO, leave[n] + ZERO
     entry[n] = enters if enters > before else before
@@ -307,7 +317,7 @@ def _restrict(n, enters, leaves, entry, leave):
 
 
 @inlined
-def _enter_line(g, h, entry, leave):
+def _enter_line(g: Any, h: Any, entry: Any, leave: Any) -> None:
     """Restrict [entry, leave] (n,) to the time when gaps are closed that change evenly from g to h (n,)."""
     for n in range(entry.size):
         change = h[n] - g[n] + ZERO  # -0.0 becomes 0.0
@@ -318,7 +328,7 @@ def _enter_line(g, h, entry, leave):
 
 
 @inlined
-def _enter_parabola(g, h, middle, entry, leave):
+def _enter_parabola(g: Any, h: Any, middle: Any, entry: Any, leave: Any) -> None:
     """`_enter_line` for gaps with these values (n,) in the middle. One that is closed at both ends counts as closed.
 
     At a share s of the segment, a gap deviates from a straight line by bow s (1 - s). Roots without cancellation, as in
@@ -339,7 +349,10 @@ def _enter_parabola(g, h, middle, entry, leave):
 
 
 @device
-def enter_planes(table, pair, planes, margin, turning, nodes, middle, first, last, rows, entry, leave):
+def enter_planes(
+    table: Any, pair: Any, planes: Any, margin: float, turning: Any, nodes: Any, middle: Any, first: int, last: int,
+    rows: SampleRows, entry: Any, leave: Any,
+) -> None:  # fmt: skip
     """Restrict the intervals [entry, leave] (S,) of samples first:last in a segment to the time behind planes.
 
     entry, leave: shares of the segment, from 0 at its begin to 1 at its end.

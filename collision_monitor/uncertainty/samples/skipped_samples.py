@@ -9,7 +9,7 @@ low one and the high one of the first coordinate, which is the error along the m
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
@@ -41,7 +41,7 @@ SIDES = np.dtype(
 
 
 @device
-def find_ends(points, times, first, ends):
+def find_ends(points: Any, times: Any, first: int, ends: Any) -> float:
     """Write the first coordinates (2,) between which bodies meet, from the times (S,) of the first samples.
 
     It is infinite on a side on which none misses. points: (S, DIMENSIONS). Returns the middle.
@@ -64,7 +64,7 @@ def find_ends(points, times, first, ends):
 
 
 @device
-def set_widening(normal, arms, turns, joint, frame, widening):
+def set_widening(normal: Any, arms: Any, turns: Any, joint: Any, frame: Any, widening: Any) -> None:
     """Write the widening (DIMENSIONS,) for unit errors of bodies that touch.
 
     normal (3,): from A to B; arms (2, 3): from both origins to the points where they touch (m); turns (2, 3, 3):
@@ -87,7 +87,7 @@ def set_widening(normal, arms, turns, joint, frame, widening):
 
 
 @inlined
-def _widened(widening, z):
+def _widened(widening: Any, z: Any) -> float:
     """Widening (m) for the errors z (DIMENSIONS,)."""
     total = 0.0
     for c in range(DIMENSIONS):
@@ -96,7 +96,7 @@ def _widened(widening, z):
 
 
 @device
-def set_limits(points, times, first, middle, sides):
+def set_limits(points: Any, times: Any, first: int, middle: float, sides: Any) -> None:
     """Set the limits of the widenings from the times (S,) of the first samples; middle: see `find_ends`."""
     for side in range(2):
         sides.below[side] = sides.above[side] = inf
@@ -117,7 +117,7 @@ def set_limits(points, times, first, middle, sides):
 
 
 @inlined
-def predict_outcome(sides, z):
+def predict_outcome(sides: Any, z: Any) -> int:
     """Outcome of the sample with errors z (DIMENSIONS,): MISSES, OPEN or MEETS."""
     low, high = _widened(sides.widening[0], z), _widened(sides.widening[1], z)
     if low > sides.above[0] or high > sides.above[1]:
@@ -126,7 +126,7 @@ def predict_outcome(sides, z):
 
 
 @device
-def weigh_followed(points, weights, first, sides):
+def weigh_followed(points: Any, weights: Any, first: int, sides: Any) -> None:
     """Begin the sums of the weights with those of the first samples, which are followed."""
     for outcome in range(2):
         sides.followed[outcome] = sides.skipped[outcome] = 0.0
@@ -137,7 +137,7 @@ def weigh_followed(points, weights, first, sides):
 
 
 @device
-def stand_for_skipped(points, share, first, sides):
+def stand_for_skipped(points: Any, share: Any, first: int, sides: Any) -> None:
     """Add the weights of the samples that were skipped to the share (S,) of those that stand for them."""
     for n in range(first):
         outcome = predict_outcome(sides, points[n])

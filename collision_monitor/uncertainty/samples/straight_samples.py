@@ -7,11 +7,12 @@ an index that may be negative prevents that. Each sample is rounded as if it wer
 from __future__ import annotations
 
 from math import inf, sqrt
-from typing import Final
+from typing import Any, Final
 
 from numpy import float32
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.uncertainty.samples.normal_samples import WIDENED
 
 ERRORS: Final = 6
@@ -19,14 +20,14 @@ ERRORS: Final = 6
 
 
 @inlined
-def draw_evenly(root):
+def draw_evenly(root: Any) -> None:
     """Undo for all samples that their first coordinate is drawn wider; root (6, 6): see `set_errors`."""
     for r in range(root.shape[0]):
         root[r, 0] /= WIDENED
 
 
 @device
-def set_errors(root, frame, t, points, first, last, off):
+def set_errors(root: Any, frame: Any, t: float, points: Any, first: int, last: int, off: Any) -> None:
     """Write the errors of the samples first:last into off (ERRORS, S).
 
     root (6, 6): lower Cholesky factor of the covariance of position at time t and velocity along the rows of frame
@@ -58,7 +59,7 @@ def set_errors(root, frame, t, points, first, last, off):
 
 
 @device
-def enter_sphere(p, v, reach, end, off, first, last, times):
+def enter_sphere(p: Vector, v: Vector, reach: float, end: float, off: Any, first: int, last: int, times: Any) -> None:
     """Write the times (S,) at which the samples first:last come within `reach` (m) of the origin, until `end`.
 
     p, v (3,): stated position and velocity of B relative to A. A time is infinite if there is none.
@@ -80,7 +81,10 @@ def enter_sphere(p, v, reach, end, off, first, last, times):
 
 
 @device
-def enter_cylinder(p, v, axis, radius, half, end, off, first, last, times):
+def enter_cylinder(
+    p: Vector, v: Vector, axis: Vector, radius: float, half: float, end: float, off: Any, first: int, last: int,
+    times: Any,
+) -> None:  # fmt: skip
     """Write the times (S,) at which the samples first:last enter a cylinder about the origin, until `end`.
 
     p, v (3,): stated position and velocity of B relative to A. axis (3,): unit vector; radius, half the height (m).
@@ -114,7 +118,9 @@ def enter_cylinder(p, v, axis, radius, half, end, off, first, last, times):
 
 
 @device
-def tilt(points, row, axis, lift, turning, lean, first, last, off):
+def tilt(
+    points: Any, row: int, axis: Vector, lift: Any, turning: Any, lean: Any, first: int, last: int, off: Any
+) -> None:
     """Move the samples first:last with a point that moves up a body's axis, as errors of orientation tilt it.
 
     axis (3,): unit vector; lift (S,): way (m) of the point along it; turning: error of orientation now (rad) and its
