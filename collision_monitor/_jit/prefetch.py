@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Any, Final
 
 from llvmlite import ir
 from numba.core import types
@@ -13,13 +13,13 @@ CACHE_LINE: Final = 64
 
 
 @intrinsic
-def prefetch(context, array, row):
+def prefetch(context: Any, array: Any, row: Any) -> Any:
     """Prefetch array[row]; if the row is itself an array of numbers, its first 64 bytes. The result does not change.
 
     Kernels that visit bodies in random memory order would otherwise wait for memory longer than they compute.
     """
 
-    def generate(context, builder, signature, arguments):
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         values = context.make_array(signature.args[0])(context, builder, arguments[0])
         byte, number = ir.IntType(8).as_pointer(), ir.IntType(32)
         start = builder.mul(arguments[1], builder.extract_value(values.strides, 0))

@@ -40,14 +40,14 @@ def _axis(builder: Any, rows: list[Any], row: int, value: Any) -> Any:
 
 
 @intrinsic
-def spheres_overlap_lanes(typing_context, centre, extent, q, ball):
+def spheres_overlap_lanes(typing_context: Any, centre: Any, extent: Any, q: Any, ball: Any) -> Any:
     """Bit k: |centre[:, q + k] - (x, y, z)|^2 <= (hx + extent[0, q + k])^2, with hx the radius of the Region `ball`.
 
     Reads LANES elements from q on.
     """
     signature = types.int64(centre, extent, types.int64, ball)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         centres = _rows(context, builder, signature.args[0], arguments[0], arguments[2])
         radii = _rows(context, builder, signature.args[1], arguments[1], arguments[2])
         x, y, z, radius, _, _ = cgutils.unpack_tuple(builder, arguments[3])
@@ -63,14 +63,14 @@ def spheres_overlap_lanes(typing_context, centre, extent, q, ball):
 
 
 @intrinsic
-def boxes_overlap(typing_context, centre, extent, q, box):
+def boxes_overlap(typing_context: Any, centre: Any, extent: Any, q: Any, box: Any) -> Any:
     """Bit k: |centre[i, q + k] - (x, y, z)[i]| <= (hx, hy, hz)[i] + extent[i, q + k] on all axes i of the Region `box`.
 
     Reads LANES elements from q on.
     """
     signature = types.int64(centre, extent, types.int64, box)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         centres = _rows(context, builder, signature.args[0], arguments[0], arguments[2])
         halves = _rows(context, builder, signature.args[1], arguments[1], arguments[2])
         x, y, z, *half = cgutils.unpack_tuple(builder, arguments[3])
@@ -89,11 +89,11 @@ def boxes_overlap(typing_context, centre, extent, q, box):
 
 
 @intrinsic
-def lowest_bit(typing_context, bits):
+def lowest_bit(typing_context: Any, bits: Any) -> Any:
     """Index of the lowest bit that is set; bits must not be 0."""
     signature = types.int64(types.int64)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.cttz(arguments[0], ir.IntType(1)(1))
 
     return signature, codegen

@@ -31,7 +31,7 @@ def _better(builder: Any, value: Any, index: Any, other_value: Any, other_index:
     return builder.select(take, other_value, value), builder.select(take, other_index, index)
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def farthest_vertex(typing_context: Any, vertices: Any, start: Any, count: Any, dx: Any, dy: Any, dz: Any) -> Any:
     """Index of the first vertex with the greatest d.v among `count` columns of vertices (3, V) from `start` on.
 

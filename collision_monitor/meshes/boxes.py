@@ -81,10 +81,10 @@ def _gaps(x: list[Lanes], own: list[Lanes], shadow: list[Lanes], zero: Lanes) ->
 
 
 @intrinsic
-def _gap_bounds(typing_context, half, M, blocks, block, out, at):
+def _gap_bounds(typing_context: Any, half: Any, M: Any, blocks: Any, block: Any, out: Any, at: Any) -> Any:
     signature = types.void(half, M, blocks, types.int64, out, types.int64)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         zero = Lanes.constant(builder, 0.0)
         e = [Lanes.constant(builder, number) for number in cgutils.unpack_tuple(builder, arguments[0])]
         placing = [Lanes.constant(builder, number) for number in cgutils.unpack_tuple(builder, arguments[1])]
@@ -104,10 +104,10 @@ def _gap_bounds(typing_context, half, M, blocks, block, out, at):
 
 
 @intrinsic
-def _separations(typing_context, half, M, blocks, block, out, at):
+def _separations(typing_context: Any, half: Any, M: Any, blocks: Any, block: Any, out: Any, at: Any) -> Any:
     signature = types.void(half, M, blocks, types.int64, out, types.int64)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         def vectors(k: int) -> list[Lanes]:
             return [Lanes.constant(builder, number) for number in cgutils.unpack_tuple(builder, arguments[k])]
 
@@ -139,10 +139,10 @@ def _separations(typing_context, half, M, blocks, block, out, at):
 
 
 @intrinsic
-def _triangle_bounds(typing_context, half, M, blocks, block, out, at):
+def _triangle_bounds(typing_context: Any, half: Any, M: Any, blocks: Any, block: Any, out: Any, at: Any) -> Any:
     signature = types.void(half, M, blocks, types.int64, out, types.int64)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         zero = Lanes.constant(builder, 0.0)
         e = [Lanes.constant(builder, number) for number in cgutils.unpack_tuple(builder, arguments[0])]
         placing = [Lanes.constant(builder, number) for number in cgutils.unpack_tuple(builder, arguments[1])]

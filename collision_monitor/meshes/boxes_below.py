@@ -23,10 +23,10 @@ def is_all_above_zero(numbers: Lanes) -> Any:
 
 
 @intrinsic
-def _below(typing_context, limit, numbers, at, blocks, block):
+def _below(typing_context: Any, limit: Any, numbers: Any, at: Any, blocks: Any, block: Any) -> Any:
     signature = types.int64(types.float64, numbers, types.int64, blocks, types.int64)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         limit = Lanes.constant(builder, arguments[0])
         number = load_lanes(context, builder, signature.args[1], arguments[1], arguments[2])
         child = Block(context, builder, signature.args[3], arguments[3], arguments[4]).row(CHILD)
@@ -45,10 +45,10 @@ def boxes_below(limit: float, numbers: Any, at: int, blocks: Any, block: int) ->
 
 
 @intrinsic
-def _first(typing_context, bits):
+def _first(typing_context: Any, bits: Any) -> Any:
     signature = types.int64(types.int64)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.cttz(arguments[0], ir.Constant(ir.IntType(1), 1))
 
     return signature, codegen
@@ -61,10 +61,10 @@ def first_of(bits: int) -> int:
 
 
 @intrinsic
-def _count(typing_context, bits):
+def _count(typing_context: Any, bits: Any) -> Any:
     signature = types.int64(types.int64)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return builder.ctpop(arguments[0])
 
     return signature, codegen

@@ -80,10 +80,10 @@ def _chosen(back: list[Lanes], rows: list[Lanes]) -> Lanes:
 
 
 @intrinsic
-def _bounds(typing_context, n, u, gaps, blocks, block, out, at):
+def _bounds(typing_context: Any, n: Any, u: Any, gaps: Any, blocks: Any, block: Any, out: Any, at: Any) -> Any:
     signature = types.void(n, u, gaps, blocks, types.int64, out, types.int64)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         def vector(k: int) -> list[Lanes]:
             return [Lanes.constant(builder, number) for number in cgutils.unpack_tuple(builder, arguments[k])]
 
@@ -124,10 +124,10 @@ REACHES: Final = len(_DIRECTIONS)
 
 
 @intrinsic
-def _extend(typing_context, x, reach):
+def _extend(typing_context: Any, x: Any, reach: Any) -> Any:
     signature = types.void(x, reach)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         point = [Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[0])]
         array = signature.args[1], arguments[1]
         for at in range(0, REACHES, WIDTH):

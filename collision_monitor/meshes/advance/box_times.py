@@ -119,10 +119,13 @@ def _rows_of(context: Any, builder: Any, array_type: Any, array: Any, place: Any
 
 
 @intrinsic
-def _box_times(typing_context, blocks_a, place, M, center, move, blocks, block, out, at):
+def _box_times(
+    typing_context: Any, blocks_a: Any, place: Any, M: Any, center: Any, move: Any, blocks: Any, block: Any, out: Any,
+    at: Any,
+) -> Any:  # fmt: skip
     signature = types.void(blocks_a, types.int64, M, center, move, blocks, types.int64, out, types.int64)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         def vectors(k: int) -> list[Lanes]:
             return [Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[k])]
 

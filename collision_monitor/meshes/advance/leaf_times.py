@@ -42,10 +42,10 @@ _REACH: Final = 3 * WIDTH
 
 
 @intrinsic
-def _extents(typing_context, directions, blocks, block, out, at):
+def _extents(typing_context: Any, directions: Any, blocks: Any, block: Any, out: Any, at: Any) -> Any:
     signature = types.void(directions, blocks, types.int64, out, types.int64)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         numbers = [Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[0])]
         members = Block(context, builder, signature.args[1], arguments[1], arguments[2])
         corners = [members.vector(CORNERS + 3 * i) for i in range(3)]
@@ -60,10 +60,10 @@ def _extents(typing_context, directions, blocks, block, out, at):
 
 
 @intrinsic
-def _reaches(typing_context, blocks, block, out, at):
+def _reaches(typing_context: Any, blocks: Any, block: Any, out: Any, at: Any) -> Any:
     signature = types.void(blocks, types.int64, out, types.int64)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         members = Block(context, builder, signature.args[0], arguments[0], arguments[1])
         x, y, z = (inner(corner, corner) for corner in (members.vector(CORNERS + 3 * i) for i in range(3)))
         far = x.largest(y).largest(z).root()
@@ -74,11 +74,11 @@ def _reaches(typing_context, blocks, block, out, at):
 
 
 @intrinsic
-def _raise_times(typing_context, numbers, enough, work, other, times):
+def _raise_times(typing_context: Any, numbers: Any, enough: Any, work: Any, other: Any, times: Any) -> Any:
     """Raise the times of eight pairs to those until which they stay apart, or to `enough` if all of them are later."""
     signature = types.void(numbers, types.float64, work, types.int64, types.int64)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         fields = [Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[0])]
         gap, speed, bent, largest, change, bend, jerk, until = fields
         enough, array = Lanes.constant(builder, arguments[1]), (signature.args[2], arguments[2])

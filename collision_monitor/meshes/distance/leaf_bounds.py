@@ -28,11 +28,11 @@ def _reach(n: list[Lanes], members: Block) -> Lanes:
 
 
 @intrinsic
-def _reach_along(typing_context, n, blocks, block, out, at):
+def _reach_along(typing_context: Any, n: Any, blocks: Any, block: Any, out: Any, at: Any) -> Any:
     """Write how far the triangles of a block reach along n, with their radii, to out[at: at + 8] (m)."""
     signature = types.void(n, blocks, types.int64, out, types.int64)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         n = [Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[0])]
         members = Block(context, builder, signature.args[1], arguments[1], arguments[2])
         store(context, builder, _reach(n, members), signature.args[3], arguments[3], arguments[4])
@@ -42,11 +42,11 @@ def _reach_along(typing_context, n, blocks, block, out, at):
 
 
 @intrinsic
-def _raise_bounds(typing_context, numbers, work, other, known, out):
+def _raise_bounds(typing_context: Any, numbers: Any, work: Any, other: Any, known: Any, out: Any) -> Any:
     """Write max(least, known, (gap - other)^2) to work[out: out + 8], of the numbers least (m^2) and gap (m)."""
     signature = types.void(numbers, work, types.int64, types.int64, types.int64)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         least, gap = (Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[0]))
         array = signature.args[1], arguments[1]
         far, before = (load_lanes(context, builder, *array, at) for at in arguments[2:4])
@@ -87,10 +87,10 @@ def _foremost(rows: list[Lanes], better: Callable[[Lanes, Lanes], Lanes]) -> Any
 
 
 @intrinsic
-def _farthest(typing_context, n, blocks, block):
+def _farthest(typing_context: Any, n: Any, blocks: Any, block: Any) -> Any:
     signature = types.float64(n, blocks, types.int64)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         n = [Lanes.constant(builder, each) for each in cgutils.unpack_tuple(builder, arguments[0])]
         reach = _reach(n, Block(context, builder, signature.args[1], arguments[1], arguments[2]))
         return _foremost([reach], Lanes.largest)
@@ -105,10 +105,10 @@ def farthest_along(n: Vector, blocks: Any, leaf: int) -> float:
 
 
 @intrinsic
-def _least(typing_context, work, at):
+def _least(typing_context: Any, work: Any, at: Any) -> Any:
     signature = types.float64(work, types.int64)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         rows = _rows(context, builder, signature.args[0], arguments)
         return _foremost(rows, Lanes.least)
 
@@ -116,11 +116,11 @@ def _least(typing_context, work, at):
 
 
 @intrinsic
-def _first_equal(typing_context, work, at, number):
+def _first_equal(typing_context: Any, work: Any, at: Any, number: Any) -> Any:
     """The first number of all pairs that equals another one, or the last."""
     signature = types.int64(work, types.int64, types.float64)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         number, bits = Lanes.constant(builder, arguments[2]), ir.Constant(ir.IntType(64), 1 << (PAIRS_OF_LEAVES - 1))
         for k, row in enumerate(_rows(context, builder, signature.args[0], arguments)):
             equal = builder.bitcast(builder.fcmp_ordered("==", row.value, number.value), ir.IntType(WIDTH))

@@ -58,25 +58,25 @@ def _may_meet(context: Any, builder: Any, signature: Any, arguments: Any, slack:
 
 
 @intrinsic
-def may_cross(typing_context, triangle, radius, blocks, block):
+def may_cross(typing_context: Any, triangle: Any, radius: Any, blocks: Any, block: Any) -> Any:
     """Bit k for each triangle k of a block that no plane separates from a triangle, or if there is a radius.
 
     triangle: its nine coordinates in the frame of the block's tree (m). radius (m): by which it is enlarged.
     """
     signature = types.int64(triangle, radius, blocks, types.int64)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return _may_meet(context, builder, signature, arguments, None)
 
     return signature, codegen
 
 
 @intrinsic
-def may_touch(typing_context, triangle, radius, blocks, block, slack):
+def may_touch(typing_context: Any, triangle: Any, radius: Any, blocks: Any, block: Any, slack: Any) -> Any:
     """`may_cross` for triangles that are at most the slack (m) apart."""
     signature = types.int64(triangle, radius, blocks, types.int64, types.float64)
 
-    def codegen(context, builder, signature, arguments):
+    def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         return _may_meet(context, builder, signature, arguments, Lanes.constant(builder, arguments[4]))
 
     return signature, codegen
