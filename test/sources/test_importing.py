@@ -447,5 +447,6 @@ def test_a_disk_that_is_full_leaves_no_half_of_a_session(tmp_path: Path, capsys:
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert code == 1
-    assert capsys.readouterr().err == f"collision-monitor: error: {tmp_path / 'b.mcap'}: File too large\n"
+    reason = "expected to be able to write there, got: File too large"
+    assert capsys.readouterr().err == f"collision-monitor: error: {tmp_path / 'b.mcap'}: {reason}\n"
     assert sorted(path.name for path in tmp_path.iterdir()) == ["a.mcap", "bag", "map.yaml"]

@@ -177,7 +177,7 @@ def test_with_force_a_command_writes_its_file_again(work: _Work) -> None:
 def test_a_device_is_not_replaced_by_a_salvaged_file(work: _Work) -> None:
     os.mkfifo(work.folder / "pipe")
     code, error = work.run("salvage run.mcap -o pipe --force")
-    assert code == 1 and one_line(error) and "got a device" in error and (work.folder / "pipe").is_fifo()
+    assert code == 1 and one_line(error) and "got a named pipe" in error and (work.folder / "pipe").is_fifo()
 
 
 def test_a_recording_is_not_imported_into_its_own_folder(work: _Work) -> None:
