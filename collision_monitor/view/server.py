@@ -10,6 +10,7 @@ import asyncio
 import contextlib
 import http
 import io
+import logging
 import socket
 import warnings
 from collections.abc import Iterable, Iterator
@@ -68,7 +69,9 @@ def _guarded(hosts: OwnHosts, lines: RefusalLines) -> Iterator[None]:
             return connection.respond(http.HTTPStatus.FORBIDDEN, "FORBIDDEN\n")  # type: ignore[no-any-return]
 
         guarded.append(True)
-        return serve(*arguments, process_request=check, **options)
+        logger = logging.getLogger(f"{__name__}.connections")
+        logger.filters = [lambda record: _say(record, lines)]  # in place of tracebacks of what is no request
+        return serve(*arguments, process_request=check, **(options | {"logger": logger}))
 
     async def consume(connection: Any, take: Any, kind: Any) -> None:
         asyncio.get_running_loop().set_exception_handler(lambda _, context: lines.add(_what(context)))
@@ -95,6 +98,14 @@ def _guarded(hosts: OwnHosts, lines: RefusalLines) -> Iterator[None]:
         sockets.serve = serve  # type: ignore[misc]
     if not guarded:
         raise UnsupportedError(f"view: expected viser 1.1, got {viser.__version__}, which cannot be guarded")
+
+
+def _say(record: logging.LogRecord, lines: RefusalLines) -> bool:
+    """Print a warning or an error of a connection in one line; nothing goes on to the log."""
+    if record.levelno >= logging.WARNING:
+        error = record.exc_info[1] if record.exc_info else None
+        lines.add(f"a connection: {record.getMessage()}" + (f": {error!r:.200}" if error is not None else ""))
+    return False
 
 
 def _what(context: dict[str, Any]) -> str:

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from collision_monitor.shapes.surfaces import surface_triangles
 from rclpy.serialization import deserialize_message
 from visualization_msgs.msg import Marker as RosMarker
 from visualization_msgs.msg import MarkerArray
@@ -20,6 +19,7 @@ from collision_monitor.shapes.registry import (
     Mesh,
     Polygon,
     Sphere,
+    kind_of,
 )
 
 
@@ -44,6 +44,10 @@ def test_rclpy_reads_what_was_written():
     assert gone.action == RosMarker.DELETE
 
 
+def triangles_of(shape):
+    return kind_of(shape).triangles(shape)
+
+
 TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
 
 
@@ -66,13 +70,13 @@ TETRAHEDRON = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
     ids=lambda value: type(value).__name__,
 )
 def test_a_surface_fills_the_extent_of_its_shape(shape, low, high):
-    corners = surface_triangles(shape).reshape(-1, 3)
+    corners = triangles_of(shape).reshape(-1, 3)
     assert corners.min(axis=0) == pytest.approx(low, abs=1e-12)
     assert corners.max(axis=0) == pytest.approx(high, abs=1e-12)
 
 
 @pytest.mark.parametrize(("shape", "volume"), [(Box((1, 2, 3)), 6.0), (Cylinder(1, 2), 2 * np.pi), (Sphere(1), 4.19)])
 def test_the_faces_of_a_solid_look_outwards(shape, volume):
-    a, b, c = np.moveaxis(surface_triangles(shape), 1, 0)
+    a, b, c = np.moveaxis(triangles_of(shape), 1, 0)
     enclosed = np.einsum("ni,ni->", a, np.cross(b, c)) / 6
     assert enclosed == pytest.approx(volume, rel=0.1)
