@@ -101,9 +101,15 @@ def _guarded(hosts: OwnHosts, lines: RefusalLines) -> Iterator[None]:
 
 
 def _say(record: logging.LogRecord, lines: RefusalLines) -> bool:
-    """Print a warning or an error of a connection in one line; nothing goes on to the log."""
-    if record.levelno >= logging.WARNING:
-        error = record.exc_info[1] if record.exc_info else None
+    """Print a warning or an error of a connection in one line; nothing goes on to the log.
+
+    Browsers open connections that they close without a request. That is no error.
+    """
+    from websockets.exceptions import ConnectionClosed
+
+    error = record.exc_info[1] if record.exc_info else None
+    was_closed = isinstance(error, ConnectionClosed) or isinstance(getattr(error, "__cause__", None), EOFError)
+    if record.levelno >= logging.WARNING and not was_closed:
         lines.add(f"a connection: {record.getMessage()}" + (f": {error!r:.200}" if error is not None else ""))
     return False
 
