@@ -100,6 +100,20 @@ class Summary:
     failures: list[Failure] = field(default_factory=list)
 
 
+def settled_memory() -> int:
+    """Memory of this process (bytes) without what can be collected."""
+    gc.collect()
+    return resident()
+
+
+def note_growth(summary: Any, settled: int, seed: int, messages: int) -> None:
+    """Note how much memory grew since a fifth of the messages, when it was `settled` (bytes; 0: not so far yet)."""
+    summary.growth = settled_memory() - settled if settled else 0.0
+    if summary.growth > GROWTH and not summary.failures:
+        problem = f"memory grew by {summary.growth / 1e6:.1f} MB in {messages - messages // 5} messages"
+        summary.failures.append(Failure(seed, messages, problem, "", ""))
+
+
 def resident() -> int:
     """Return the resident memory of this process (bytes)."""
     return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGESIZE")
@@ -162,13 +176,8 @@ class Campaign:
                 break
             summary.messages += 1
             if index == messages // 5:
-                gc.collect()
-                settled = resident()
-        gc.collect()
-        summary.growth = resident() - settled if settled else 0.0
-        if summary.growth > GROWTH and not summary.failures:
-            problem = f"memory grew by {summary.growth / 1e6:.1f} MB in {messages - messages // 5} messages"
-            summary.failures.append(Failure(self.seed, messages, problem, "", ""))
+                settled = settled_memory()
+        note_growth(summary, settled, self.seed, messages)
         monitor = self.pipeline.monitor
         summary.digest = monitor.digest
         summary.refused = {reason.value: count for reason, count in monitor.refused.items()}

@@ -19,7 +19,7 @@ from random import Random
 from typing import Any, Final
 
 import numpy as np
-from campaign import GROWTH, LARGEST, SLOWEST, START, STUCK, Failure, resident
+from campaign import LARGEST, SLOWEST, START, STUCK, Failure, note_growth, settled_memory
 from dice import Dice
 from foreign_bag import STORE, odometry, pose_stamped, transforms
 from ros_messages import definitions
@@ -188,13 +188,8 @@ class SourceCampaign:
                 break
             summary.messages += 1
             if index == messages // 5:
-                gc.collect()
-                settled = resident()
-        gc.collect()
-        summary.growth = resident() - settled if settled else 0.0
-        if summary.growth > GROWTH and not summary.failures:
-            problem = f"memory grew by {summary.growth / 1e6:.1f} MB in {messages - messages // 5} messages"
-            summary.failures.append(Failure(self._seed, messages, problem, "", ""))
+                settled = settled_memory()
+        note_growth(summary, settled, self._seed, messages)
         summary.refused = sum(self.feed.scene.refused.values())
         return summary
 
