@@ -42,7 +42,7 @@ _HOME = {
     "ObjectDescription": "objects.description",
     "Model": "records",
     "Pose": "shapes.pose",
-    "Motion": "shapes.pose",
+    "Motion": "motion.stated_motion",
     "load_mesh": "shapes.mesh_file",
     "contact": "query.contact.contact",
     "Contact": "query.contact.contact",
@@ -130,7 +130,7 @@ if TYPE_CHECKING:
     from collision_monitor.records import Model as Model
     from collision_monitor.settings.profile import Profile as Profile
     from collision_monitor.shapes.mesh_file import load_mesh as load_mesh
-    from collision_monitor.shapes.pose import Motion as Motion
+    from collision_monitor.motion.stated_motion import Motion as Motion
     from collision_monitor.shapes.pose import Pose as Pose
     from collision_monitor.shapes.registry import *  # noqa: F403
 

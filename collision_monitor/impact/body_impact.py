@@ -1,4 +1,4 @@
-"""Time of impact of two bodies at constant twist, as an interval whose lower end is safe.
+"""Time of impact of two bodies on their courses, as an interval whose lower end is safe.
 
 Conservative advancement along a separating axis (Mirtich 1996). It follows the rotation to first order (advance.py) and
 therefore converges quadratically, while a bound by |w| r converges linearly.
@@ -31,7 +31,16 @@ from collision_monitor.impact.sphere_interval import meeting_of_spheres, relativ
 from collision_monitor.impact.tree_impact import FULL
 from collision_monitor.meshes.distance.nearest import MEMORY, PLACE_A, PLACE_B, answer_row
 from collision_monitor.motion.bodies import next_pair, place_shape
-from collision_monitor.motion.motion import half_acceleration, relative_position, relative_velocity, rotation_at
+from collision_monitor.motion.motion import (
+    angular_velocity_at,
+    change_at,
+    half_acceleration,
+    position_at,
+    relative_position,
+    relative_velocity,
+    rotation_at,
+    smooth_until,
+)
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.dispatch import separation
 from collision_monitor.narrow_phase.pair_pose import PairPose
@@ -142,8 +151,6 @@ def shape_impact(
     begin, end = window
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
-    acceleration = (B.ax - A.ax, B.ay - A.ay, B.az - A.az)
-    w_a, w_b = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
     n_before = AT_REST
     t = t_before = begin
     gap_before = inf
@@ -165,10 +172,12 @@ def shape_impact(
             status = HIT
             break
         n, v = (out[0], out[1], out[2]), relative_velocity(A, B, t)
-        at = Placed(a, b, R_a, R_b, oa, ob, (px, py, pz), v, acceleration, w_a, w_b)
+        border = min(end, smooth_until(A, B, t))
+        w_a, w_b, change = angular_velocity_at(A, t), angular_velocity_at(B, t), change_at(A, B, t, border - t)
+        at = Placed(a, b, R_a, R_b, oa, ob, (px, py, pz), v, w_a, w_b, change)
         # aim at half the tolerance, so that the last advance ends inside it
         aim = gap - 0.5 * query.tolerance
-        d, m, until = 0.0, AT_REST, end - t
+        d, m, until = 0.0, AT_REST, border - t
         for turns in range(2):
             d = max(d, advance_along_axis(table, at, n, m, -tube.growth, aim, until))
             if turns or t == t_before or d >= until:
@@ -178,8 +187,11 @@ def shape_impact(
                 break
             until = min(until, FARTHER * d)
         t_before, gap_before, n_before = t, gap, n
-        if d >= end - t:
-            return CLEAR, end, iteration, guess
+        if d >= border - t:
+            if border == end:
+                return CLEAR, end, iteration, guess
+            t = border  # where a body comes to rest
+            continue
         if t + d <= t:  # the time has no finer resolution
             break
         t += d
@@ -215,7 +227,7 @@ def _contact_at(table: Any, parts: Any, pair: ShapePair, t: float, places: Any, 
         out[POINT_A + k] += oa[k]
         out[POINT_B + k] += oa[k]
     v = relative_velocity(A, B, t)
-    out[CLOSING] = closing_speed(v, (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz), p, out)
+    out[CLOSING] = closing_speed(v, angular_velocity_at(A, t), angular_velocity_at(B, t), p, out)
     return out[DISTANCE]
 
 
@@ -346,7 +358,7 @@ def chains_impact(
     event.status = CLEAR
     tube = tube_of(A, B, begin)
     approach = relative_motion_at(A, B, begin)
-    bent = half_acceleration(A, B) * (end - begin)  # m/s: the path deviates from its tangent by less
+    bent = half_acceleration(A, B, begin, end) * (end - begin)  # m/s: the path deviates from its tangent by less
     # every impact lies in the time in which the bounding spheres overlap
     first, last = 0.0, end - begin
     reach = A.radius + B.radius + query.margin
@@ -388,10 +400,10 @@ def chains_impact(
 @inlined
 def _set_geometry(event: Any, A: Any, t: float, out: Any) -> None:
     """Set point, normal and closing speed of the impact from a contact at time t about A's origin."""
-    ta = t - A.time
-    event.point_x = A.x + (A.vx + 0.5 * A.ax * ta) * ta + 0.5 * (out[POINT_A] + out[POINT_B])
-    event.point_y = A.y + (A.vy + 0.5 * A.ay * ta) * ta + 0.5 * (out[POINT_A + 1] + out[POINT_B + 1])
-    event.point_z = A.z + (A.vz + 0.5 * A.az * ta) * ta + 0.5 * (out[POINT_A + 2] + out[POINT_B + 2])
+    x, y, z = position_at(A, t)
+    event.point_x = x + 0.5 * (out[POINT_A] + out[POINT_B])
+    event.point_y = y + 0.5 * (out[POINT_A + 1] + out[POINT_B + 1])
+    event.point_z = z + 0.5 * (out[POINT_A + 2] + out[POINT_B + 2])
     event.normal_x, event.normal_y, event.normal_z = out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]
     event.closing_speed = out[CLOSING]
 

@@ -15,7 +15,15 @@ from collision_monitor.geometry.vector import Vector, cross, dot, minus, opposit
 from collision_monitor.impact.advance import Placed, advance_along_axis
 from collision_monitor.impact.body_impact import AT_REST
 from collision_monitor.motion.bodies import place_shape
-from collision_monitor.motion.motion import relative_position, relative_velocity, rotation_at
+from collision_monitor.motion.motion import (
+    PairChange,
+    angular_velocity_at,
+    change_at,
+    relative_position,
+    relative_velocity,
+    rotation_at,
+    smooth_until,
+)
 from collision_monitor.narrow_phase.contact_row import NORMAL
 from collision_monitor.narrow_phase.core import rounding
 from collision_monitor.narrow_phase.dispatch import pair_contact
@@ -87,8 +95,6 @@ def touching_impact(
     begin, end = window
     R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
-    acceleration = (B.ax - A.ax, B.ay - A.ay, B.az - A.az)
-    w_a, w_b = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
     t = before = begin
     n, is_new = AT_REST, True
     for _ in range(STEPS):
@@ -106,11 +112,16 @@ def touching_impact(
                 return DEEPENS, before
         if gap > apart:
             return PARTS, t
-        at = Placed(
-            a, b, R_a, R_b, oa, ob, (px, py, pz), relative_velocity(A, B, t), acceleration,
-            _turning(table, a, R_a, oa, w_a, n), _turning(table, b, R_b, ob, w_b, n),
+        border = min(end, smooth_until(A, B, t))
+        w_a = _turning(table, a, R_a, oa, angular_velocity_at(A, t), n)
+        w_b = _turning(table, b, R_b, ob, angular_velocity_at(B, t), n)
+        change = change_at(A, B, t, border - t)
+        change = PairChange(
+            change.acceleration, change.jerk,
+            change.turning_a if dot(w_a, w_a) > 0.0 else AT_REST, change.turning_b if dot(w_b, w_b) > 0.0 else AT_REST,
         )  # fmt: skip
-        d = advance_along_axis(table, at, n, AT_REST, 0.0, gap + skin, end - t)
+        at = Placed(a, b, R_a, R_b, oa, ob, (px, py, pz), relative_velocity(A, B, t), w_a, w_b, change)
+        d = advance_along_axis(table, at, n, AT_REST, 0.0, gap + skin, border - t)
         share = 1.0
         for _halving in range(HALVINGS):  # the latest time of these at which they are apart along the direction
             later = t + share * d
@@ -124,8 +135,11 @@ def touching_impact(
             if _gap_along(table, a, b, R_a, R_b, between, n) - separation > apart:
                 return PARTS, later
             share *= 0.5
-        if d >= end - t:
-            return RESTS, end
+        if d >= border - t:
+            if border == end:
+                return RESTS, end
+            before, t = t, border
+            continue
         if t + d <= t:
             return DEEPENS, before
         before = t

@@ -152,8 +152,8 @@ def shape_feature_at(table: Any, s: int, x: Vector, n: Vector, reach: float, wor
 @inlined
 def origin_now(bodies: Any, i: int, now: float) -> Vector:
     """Position of body i in the world at `now` (s)."""
-    age = age_of(bodies, i, now)
-    return position_now(bodies, i, age, 0), position_now(bodies, i, age, 1), position_now(bodies, i, age, 2)
+    at: Vector = position_now(bodies, i, age_of(bodies, i, now))
+    return at
 
 
 @inlined

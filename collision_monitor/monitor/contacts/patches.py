@@ -130,12 +130,13 @@ def _join(bodies: Any, active: Active, now: float, patches: _Patches, most: int,
         points.count[k] = m
         i, j = pairs[k].i, pairs[k].j
         there = relative_now(bodies, i, j, now)
+        at = position_now(bodies, i, there.age_i)
         out[:POINT_A] = results[k, :POINT_A]
         for c in range(m):
             for d in range(3):
                 out[POINT_A + d] = corners[c, d]
                 out[POINT_B + d] = corners[c, d] + out[DISTANCE] * out[NORMAL + d]
-                points.position[k, c, d] = corners[c, d] + position_now(bodies, i, there.age_i, d)
+                points.position[k, c, d] = corners[c, d] + at[d]
             points.closing[k, c] = closing_now(bodies, i, j, there, out)
 
 

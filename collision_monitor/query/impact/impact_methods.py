@@ -23,7 +23,8 @@ from collision_monitor.query.body import kept_slots
 from collision_monitor.query.impact.impact_kernel import MEMORY, impacts_of_chains, set_pair
 from collision_monitor.query.impact.impact_query import ITERATIONS
 from collision_monitor.query.library import LIBRARY
-from collision_monitor.shapes.pose import Motion, Pose
+from collision_monitor.motion.stated_motion import Motion, straight_motions
+from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Box, HalfSpace, Shape, Sphere
 from collision_monitor.tolerances import PARALLEL_SIN2
 
@@ -43,7 +44,7 @@ class MovingShapes(NamedTuple):
     library: tuple[Any, Any]  # ShapeTable and Parts
     motion: Any  # (2,) MOTION, memory
     chains: tuple[np.int32, np.int32]
-    motions_a: Array  # (N, 16): pose, linear and angular velocity, acceleration
+    motions_a: Array  # (N, NUMBERS) of a Motion
     motions_b: Array
 
 
@@ -53,8 +54,7 @@ def moving_shapes(shape_a: Shape, a: Array, shape_b: Shape, b: Array) -> MovingS
     if not all(each is not None and each.is_convex for each in kept):
         raise UnsupportedError("expected convex shapes; supported are all but compounds, concave Mesh and Polygon")
     chains = np.int32(kept[0].first), np.int32(kept[1].first)  # type: ignore[union-attr]
-    still = np.zeros((len(a), 3))
-    motions = np.concatenate([a, still], axis=1), np.concatenate([b, still], axis=1)
+    motions = straight_motions(a), straight_motions(b)
     return MovingShapes(LIBRARY.tuples, MEMORY.motion, chains, *motions)
 
 
