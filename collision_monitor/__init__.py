@@ -102,6 +102,7 @@ if TYPE_CHECKING:
     from collision_monitor.monitor.monitor import Monitor as Monitor
     from collision_monitor.monitor.result import StepResult as StepResult
     from collision_monitor.monitor.result import StepStatus as StepStatus
+    from collision_monitor.motion.stated_motion import Motion as Motion
     from collision_monitor.objects.convex_decomposition import Decomposition as Decomposition
     from collision_monitor.objects.convex_decomposition import convex_decomposition as convex_decomposition
     from collision_monitor.objects.description import ObjectDescription as ObjectDescription
@@ -130,7 +131,6 @@ if TYPE_CHECKING:
     from collision_monitor.records import Model as Model
     from collision_monitor.settings.profile import Profile as Profile
     from collision_monitor.shapes.mesh_file import load_mesh as load_mesh
-    from collision_monitor.motion.stated_motion import Motion as Motion
     from collision_monitor.shapes.pose import Pose as Pose
     from collision_monitor.shapes.registry import *  # noqa: F403
 

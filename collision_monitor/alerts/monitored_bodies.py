@@ -17,11 +17,12 @@ class MonitoredBodies:
     """The bodies at `now` (s after the monitor's origin), in the world frame; N slots.
 
     present (N,): the body is described and has a state, and lies in the region of interest. position, velocity, angular
-    (N, 3): extrapolated from the last states. radius (N,): of the sphere about the origin that holds the body (m); may
-    be infinite. turning (N,): bound on the speed of its points about the origin (m/s); speed (N,): on any.
-    acceleration (N, 3): constant from now on (m/s^2), 0 for a body that brakes or goes along an arc; bending (N,): a
-    bound on that of such a body until the horizon, else 0. doubt (N,): how far it may have left its path since its last state (m). stale (N,): the last state is too old, or
-    there is none. scratch: memory for the kernels, of one thread; None: its own.
+    (N, 3): extrapolated from the last states. acceleration (N, 3): constant from now on, 0 for a body that brakes or
+    goes along an arc; bending (N,): a bound on that of such a body until the horizon, else 0. radius (N,): of the
+    sphere about the origin that holds the body (m); may be infinite. turning (N,): bound on the speed of its points
+    about the origin (m/s); speed (N,): on any. doubt (N,): how far it may have left its path since its last state (m).
+    stale (N,): the last state is too old, or there is none. scratch: memory for the kernels, of one thread; None: its
+    own.
     """
 
     def __init__(self, roster: Roster, profile: Profile, now: float, scratch: Scratch | None = None) -> None:

@@ -190,7 +190,10 @@ def tree_approach_at(
     bend = sqrt(dot(own, own))
     if not are_straight(A, B):
         bend = 2.0 * half_acceleration(A, B, t, until)
-        harder_a, harder_b = sqrt(dot(change.turning_a, change.turning_a)), sqrt(dot(change.turning_b, change.turning_b))
+        harder_a, harder_b = (
+            sqrt(dot(change.turning_a, change.turning_a)),
+            sqrt(dot(change.turning_b, change.turning_b)),
+        )
         bend_a, bend_b = turning_rate(A, t, until) ** 2 + harder_a, turning_rate(B, t, until) ** 2 + harder_b
         if harder_a + harder_b > 0.0 or smooth_until(A, B, t) < until:
             jerk = UNBOUNDED  # the largest acceleration of any time bounds the gaps alone

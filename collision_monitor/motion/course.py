@@ -40,7 +40,9 @@ class Place(NamedTuple):
 
     moved: Any  # (3,): displacement of the origin (m)
     velocity: Any  # (3,): m/s
-    rate: Any  # of running through the course: factor of the state's speed and angular velocity, except on a straight one
+    rate: (
+        Any  # of running through the course: factor of the state's speed and angular velocity, except on a straight one
+    )
 
 
 class Change(NamedTuple):

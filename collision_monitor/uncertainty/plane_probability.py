@@ -29,8 +29,8 @@ from collision_monitor.uncertainty.pair_errors import (
     deviation_at,
     set_gap_covariance,
     surface_bend,
-    way_at,
     swing_bound,
+    way_at,
 )
 from collision_monitor.uncertainty.plane_impacts import enter_bodies, enter_surely
 from collision_monitor.uncertainty.round_impacts import NOT_ROUND, enter_round_bodies, round_form

@@ -21,9 +21,9 @@ from collision_monitor.monitor.contacts.mesh_faces import MeshFaces, faces_of
 from collision_monitor.monitor.state.memory_use import MemoryUse
 from collision_monitor.monitor.state.mesh_snapshot import mesh_arrays, plant_meshes
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage, check_range
-from collision_monitor.motion.course import STRAIGHT
 from collision_monitor.motion.bodies import DERIVED, BodyTable, Multibody, Parts, enlarge, make_bodies, make_parts
 from collision_monitor.motion.body_layout import lay_out_body, note_plain
+from collision_monitor.motion.course import STRAIGHT
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled, monitored_model
 from collision_monitor.records import Model, ShapeType

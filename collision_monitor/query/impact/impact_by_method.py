@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from collision_monitor.errors import InputError, UnsupportedError
+from collision_monitor.motion.stated_motion import Motion
 from collision_monitor.query.contact.contact import contact
 from collision_monitor.query.impact.impact import Impact
 from collision_monitor.query.impact.impact_methods import METHODS, bisection, end_of_step, swept_bounds
@@ -16,7 +17,6 @@ from collision_monitor.query.impact.impact_query import MotionQuery
 from collision_monitor.query.impact.moving_body import moving_body
 from collision_monitor.records import Method
 from collision_monitor.shapes.compound import Compound
-from collision_monitor.motion.stated_motion import Motion
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.reach import reach
 from collision_monitor.shapes.registry import HalfSpace, Shape

@@ -32,10 +32,10 @@ from collision_monitor.impact.touching_impact import DEEPENS, RESTS, touching_im
 from collision_monitor.meshes.distance.nearest import PLACE_A, PLACE_B
 from collision_monitor.motion.bodies import Parts, chain_radius, next_pair
 from collision_monitor.motion.motion import MOTION, quaternion_to_matrix
+from collision_monitor.motion.stated_motion import COURSE, REST, Motion
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.query.impact.impact_query import MotionQuery
 from collision_monitor.query.library import LIBRARY, Slots
-from collision_monitor.motion.stated_motion import COURSE, REST, Motion
 from collision_monitor.shapes.registry import BALL
 from collision_monitor.shapes.shape_table import ShapeTable
 from collision_monitor.tolerances import GJK_TOUCHING

@@ -19,11 +19,11 @@ from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.errors import UnsupportedError
 from collision_monitor.impact.body_impact import ShapePair, contact_at
 from collision_monitor.impact.sphere_interval import sphere_interval
+from collision_monitor.motion.stated_motion import Motion, straight_motions
 from collision_monitor.query.body import kept_slots
 from collision_monitor.query.impact.impact_kernel import MEMORY, impacts_of_chains, set_pair
 from collision_monitor.query.impact.impact_query import ITERATIONS
 from collision_monitor.query.library import LIBRARY
-from collision_monitor.motion.stated_motion import Motion, straight_motions
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Box, HalfSpace, Shape, Sphere
 from collision_monitor.tolerances import PARALLEL_SIN2
@@ -98,9 +98,7 @@ def conservative_advancement(
     (table, parts), _, chains, motions_a, motions_b = moving_shapes(shape_a, a, shape_b, b)
     first_a, first_b = np.array(chains[:1]), np.array(chains[1:])
     query, rows = np.array([horizon, tolerance, 0.0, ITERATIONS]), np.empty((len(a), 3))
-    impacts_of_chains(
-        table, parts, MEMORY.scratch, MEMORY.moving, first_a, motions_a, first_b, motions_b, query, rows
-    )
+    impacts_of_chains(table, parts, MEMORY.scratch, MEMORY.moving, first_a, motions_a, first_b, motions_b, query, rows)
     return np.ascontiguousarray(rows[:, 0])
 
 

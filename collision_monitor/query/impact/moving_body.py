@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import TooCostlyError, UnsupportedError
+from collision_monitor.motion.stated_motion import Motion, as_motion, flat_motion
 from collision_monitor.objects.models import containing_model
 from collision_monitor.query.body import PosedShapes, QueryBody, check_in_plane, exact_body
 from collision_monitor.query.points.near_points import near_points
 from collision_monitor.shapes.compound import Compound
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
 from collision_monitor.shapes.planar import flat_pose
-from collision_monitor.motion.stated_motion import Motion, as_motion, flat_motion
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.reach import reach
 from collision_monitor.shapes.registry import HalfSpace, Mesh, Points, Shape, Sphere, Triangle

@@ -12,6 +12,7 @@ from collision_monitor.errors import TooCostlyError
 from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.impact.mesh_pair import SURFACES
 from collision_monitor.meshes.trees.shape_trees import CERTAIN
+from collision_monitor.motion.stated_motion import Motion, as_motion
 from collision_monitor.query.body import KeptSlots, PosedShapes, QueryBody, kept_slots, laid_out
 from collision_monitor.query.contact.contact import check_kinds, contact, plant_bodies, plant_for_meshes
 from collision_monitor.query.contact.contact_kernel import contact_row
@@ -31,7 +32,6 @@ from collision_monitor.query.impact.moving_body import MovingBody, check_bounded
 from collision_monitor.records import Method
 from collision_monitor.shapes.compound import Compound
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
-from collision_monitor.motion.stated_motion import Motion, as_motion
 from collision_monitor.shapes.reach import reach
 from collision_monitor.shapes.registry import Mesh
 from collision_monitor.tolerances import GJK_TOUCHING

@@ -11,6 +11,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.checks.numbers import checked_rows
 from collision_monitor.errors import PoseError
+from collision_monitor.motion.stated_motion import (
+    ACCELERATION,
+    COURSE,
+    LINEAR,
+    Frame,
+    Motion,
+    is_body_frame,
+    motion_of,
+    set_courses,
+    straight_motions,
+)
 from collision_monitor.query.batch_result import BatchResult, Pairs
 from collision_monitor.query.impact.impact import Impact, impact_of_times
 from collision_monitor.query.impact.impact_kernel import MEMORY, TOUCHES, impacts_of_chains
@@ -27,17 +38,6 @@ from collision_monitor.query.pair_arrays import (
     part,
     pose_of,
     pose_rows,
-)
-from collision_monitor.motion.stated_motion import (
-    ACCELERATION,
-    COURSE,
-    LINEAR,
-    Frame,
-    Motion,
-    is_body_frame,
-    motion_of,
-    set_courses,
-    straight_motions,
 )
 from collision_monitor.tolerances import LARGEST_INPUT
 
