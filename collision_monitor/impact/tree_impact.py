@@ -13,7 +13,7 @@ from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined, outlined
-from collision_monitor.geometry.vector import cross, dot, minus, plus, rotate_back
+from collision_monitor.geometry.vector import cross, dot, minus, norm, plus, rotate_back
 from collision_monitor.impact.impact_record import CLEAR, HIT, UNRESOLVED
 from collision_monitor.meshes.advance.approach import Approach, seen_from_b
 from collision_monitor.meshes.advance.box_times import box_times
@@ -190,10 +190,7 @@ def tree_approach_at(
     bend = sqrt(dot(own, own))
     if not are_straight(A, B):
         bend = 2.0 * half_acceleration(A, B, t, until)
-        harder_a, harder_b = (
-            sqrt(dot(change.turning_a, change.turning_a)),
-            sqrt(dot(change.turning_b, change.turning_b)),
-        )
+        harder_a, harder_b = norm(change.turning_a), norm(change.turning_b)
         bend_a, bend_b = turning_rate(A, t, until) ** 2 + harder_a, turning_rate(B, t, until) ** 2 + harder_b
         if harder_a + harder_b > 0.0 or smooth_until(A, B, t) < until:
             jerk = UNBOUNDED  # the largest acceleration of any time bounds the gaps alone

@@ -333,9 +333,8 @@ def _cover_spread(
     m.spread_0 = m.spread_1 = 0.0
     if sigmas > 0.0 and not bodies.static[i]:
         age = 2.0 * (now - bodies.time[i])
-        off, growth = surface_spread(
-            bodies, spread, i, swing_radius(bodies, spread, i), age, m.cover - now, stale_acceleration
-        )
+        radius = swing_radius(bodies, spread, i)
+        off, growth = surface_spread(bodies, spread, i, radius, age, m.cover - now, stale_acceleration)
         m.spread_0, m.spread_1 = min(WIDER * sigmas * off, most[0]), min(WIDER * sigmas * growth, most[1])
 
 

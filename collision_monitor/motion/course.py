@@ -26,8 +26,8 @@ ASIDE: Final = 1.0
 that turns away counts as one that brakes."""
 
 FASTER: Final = 1.0
-"""1/s: largest increase of the speed on an arc, in parts of the speed. Larger: a robot that turns in place and starts to
-drive would be predicted to turn as much faster as it drives faster. It keeps its rate of turn instead."""
+"""1/s: largest increase of the speed on an arc, in parts of the speed. Larger: a robot that turns in place and starts
+to drive would be predicted to turn as much faster as it drives faster. It keeps its rate of turn instead."""
 
 SERIES: Final = 0.5
 """rad. Up to it, the shift of an arc is computed from a series, because its closed form cancels."""
@@ -40,9 +40,7 @@ class Place(NamedTuple):
 
     moved: Any  # (3,): displacement of the origin (m)
     velocity: Any  # (3,): m/s
-    rate: (
-        Any  # of running through the course: factor of the state's speed and angular velocity, except on a straight one
-    )
+    rate: Any  # factor of the angular velocity of the state
 
 
 class Change(NamedTuple):

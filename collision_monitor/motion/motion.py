@@ -271,7 +271,7 @@ def angular_now(bodies: Any, i: int, age: float) -> Vector:
 
 @inlined
 def bending_now(bodies: Any, i: int, age: float, ahead: float) -> float:
-    """Bound on the acceleration (m/s^2) of body i's origin from `age` seconds after its last state on, for `ahead` s."""
+    """Bound on the acceleration (m/s^2) of body i's origin in `ahead` s, from `age` s after its last state on."""
     v = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
     w = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
     a = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]

@@ -1,4 +1,4 @@
-"""Motions as a caller states them: a pose, its velocities and its acceleration, in the world or along the body's axes."""
+"""Motions as a caller states them: a pose, velocities and an acceleration, along the world's axes or the body's."""
 
 from __future__ import annotations
 

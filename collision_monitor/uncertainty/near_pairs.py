@@ -51,12 +51,9 @@ def _could_meet(multibody: Any, spread: Any, i: int, j: int, now: float, nearnes
     if not reach < inf:
         return True
     p, v, age_i, age_j = relative_now(bodies, i, j, now)
-    start_i, growth_i = surface_spread(
-        bodies, spread, i, swing_radius(bodies, spread, i), age_i, horizon, stale_acceleration
-    )
-    start_j, growth_j = surface_spread(
-        bodies, spread, j, swing_radius(bodies, spread, j), age_j, horizon, stale_acceleration
-    )
+    r_i, r_j = swing_radius(bodies, spread, i), swing_radius(bodies, spread, j)
+    start_i, growth_i = surface_spread(bodies, spread, i, r_i, age_i, horizon, stale_acceleration)
+    start_j, growth_j = surface_spread(bodies, spread, j, r_j, age_j, horizon, stale_acceleration)
     bent = 0.0
     if bodies.course[i] == STRAIGHT and bodies.course[j] == STRAIGHT:
         for c in range(3):

@@ -523,15 +523,8 @@ def impact_probabilities(
                     z = work.sample
                 shift(work, z, t, p, v, w_j)
                 if turns_i:
-                    turn(
-                        A,
-                        work.rotation[0],
-                        w_i,
-                        v_i,
-                        turn_i,
-                        _unit(z, ORIENTATION, level_i),
-                        _unit(z, LEFT_OVER, level_i),
-                    )
+                    own, left = _unit(z, ORIENTATION, level_i), _unit(z, LEFT_OVER, level_i)
+                    turn(A, work.rotation[0], w_i, v_i, turn_i, own, left)
                 if turns_j:
                     own, left = _unit(z, ORIENTATION + 3, level_j), _unit(z, LEFT_OVER + 3, level_j)
                     turn(B, work.rotation[1], w_j, (B.vx, B.vy, B.vz), turn_j, own, left)

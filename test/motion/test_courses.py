@@ -22,6 +22,7 @@ BODY, STOPS = int(StateFlag.BODY_TWIST), int(StateFlag.STOPS)
 
 Array = NDArray[np.float64]
 
+
 def torus(radius: float, tube: float, around: int, across: int) -> tuple[Array, NDArray[np.int64]]:
     """Corners and triangles of a closed torus."""
     u, v = np.meshgrid(np.arange(around) * 2 * np.pi / around, np.arange(across) * 2 * np.pi / across, indexing="ij")
@@ -107,7 +108,9 @@ def test_an_arc_of_a_tiny_angle_is_a_line_and_neighbours_agree() -> None:
     for rate in 10.0 ** np.arange(-300, -6, 9.0):
         at = Motion(Pose(), (1, 2, 3), (0, 0, rate), frame="body").at(2.0).position
         assert np.abs(at - before).max() <= 10.0 * rate + 1e-15
-    series = [Motion(Pose(), (1, 0, 0), (0, 0, 0.25 * f), frame="body").at(2.0).position for f in (1 - 1e-12, 1 + 1e-12)]
+    series = [
+        Motion(Pose(), (1, 0, 0), (0, 0, 0.25 * f), frame="body").at(2.0).position for f in (1 - 1e-12, 1 + 1e-12)
+    ]
     assert np.abs(series[0] - series[1]).max() < 1e-11
 
 
@@ -163,7 +166,9 @@ def test_the_impact_is_where_dense_samples_find_it(kinds: tuple[str, str]) -> No
         if found.status == "hit":
             at = contact(a, one.at(found.upper), b, other.at(found.upper))
             assert at.signed_distance <= at.error_bound
-            assert found.lower == 0.0 or contact(a, one.at(found.lower), b, other.at(found.lower)).signed_distance < 2e-6
+            assert (
+                found.lower == 0.0 or contact(a, one.at(found.lower), b, other.at(found.lower)).signed_distance < 2e-6
+            )
         swapped = time_of_impact(b, other, a, one, horizon=2.0)
         assert swapped.lower == pytest.approx(found.lower, abs=2e-5)
     assert statuses.count("hit") > 8 and "clear" in statuses
@@ -265,7 +270,9 @@ def test_a_robot_that_follows_its_arc_is_not_predicted_anew() -> None:
 
 
 def test_the_twist_of_an_arc_is_estimated_from_poses() -> None:
-    arc = Motion(Pose((1, 2, 3), Pose.from_euler(0.1, 0.2, 0.3).quaternion), (1, 0.2, 0.1), (0.1, 0.2, 0.8), frame="body")
+    arc = Motion(
+        Pose((1, 2, 3), Pose.from_euler(0.1, 0.2, 0.3).quaternion), (1, 0.2, 0.1), (0.1, 0.2, 0.8), frame="body"
+    )
     target = arc.at(1.9)
     monitor = cm.Monitor("exact")
     monitor.add(1, cm.Sphere(0.1))

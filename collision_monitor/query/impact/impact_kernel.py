@@ -179,8 +179,8 @@ def touching_chains(
 ) -> tuple[float, float]:
     """First impact of all pairs of slots of two objects that touch at the start: lower, upper (s), infinite for none.
 
-    chains: their own first slots. numbers (2, NUMBERS): their motions. slots: those of their pieces (n,) and (m,). query:
-    as above.
+    chains: their own first slots. numbers (2, NUMBERS): their motions. slots: those of their pieces (n,) and (m,).
+    query: as above.
     """
     A, B, window = motion[0], motion[1], Window(0.0, query[0])
     set_pair(table, parts, chains, motion, numbers, 0, numbers, 1)

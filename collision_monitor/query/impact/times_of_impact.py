@@ -107,9 +107,10 @@ def times_of_impact(
     """`time_of_impact` for N pairs of moving shapes.
 
     shapes: one for all pairs, or a list of N; poses: (N, 7) x y z qx qy qz qw (m), a list of N, or one for all;
-    twists: (N, 6) vx vy vz wx wy wz (m/s, rad/s), or one for all. progress: called with the number of pairs that are
-    done. accelerations: (N, 3) m/s^2, or one for all; frame and stops: of all motions, as of `Motion`. Convex solids take 0.2 to 5 µs a pair; compounds, open meshes, and shapes that touch at the start, 0.1 to 1
-    ms. Raises as `time_of_impact` does, and InputError if the lengths differ.
+    twists: (N, 6) vx vy vz wx wy wz (m/s, rad/s), or one for all; accelerations: (N, 3) m/s^2, or one for all; frame,
+    stops: of all motions, see `Motion`. progress: called with the number of pairs that are done. Convex solids take 0.2
+    to 5 µs a pair; compounds, open meshes, and shapes that touch at the start, 0.1 to 1 ms. Raises as `time_of_impact`
+    does, and InputError if the lengths differ.
 
     >>> import collision_monitor as cm
     >>> poses = [(x, 0, 0, 0, 0, 0, 1) for x in (2, 2.5, 9)]

@@ -211,11 +211,11 @@ def turn(m: Any, R: Any, w: Vector, velocity: Vector, off: Any, error: Vector, l
         m.rotation[1, j] = y + s * ay + c * (dz * ax - dx * az)
         m.rotation[2, j] = z + s * az + c * (dx * ay - dy * ax)
     if m.course == ARC:  # its path turns with it
-        u = cross((dx, dy, dz), velocity)
-        across = cross((dx, dy, dz), u)
-        m.vx = velocity[0] + s * u[0] + c * across[0]
-        m.vy = velocity[1] + s * u[1] + c * across[1]
-        m.vz = velocity[2] + s * u[2] + c * across[2]
+        aside = cross((dx, dy, dz), velocity)
+        back = cross((dx, dy, dz), aside)
+        m.vx = velocity[0] + s * aside[0] + c * back[0]
+        m.vy = velocity[1] + s * aside[1] + c * back[1]
+        m.vz = velocity[2] + s * aside[2] + c * back[2]
 
 
 @device
