@@ -73,7 +73,7 @@ Make = Callable[[np.random.Generator, Ticks], tuple[Any, Path3]]
 
 
 def yawed(position: Array, yaw: Array, speed: Array, rate: Array, slowing: float) -> Path3:
-    """A body on wheels, which moves where it looks. speed, rate (T,): m/s, rad/s; slowing: m/s^2, of the first speed."""
+    """A body on wheels, which moves where it looks. speed, rate (T,): m/s, rad/s; slowing: m/s^2."""
     quaternion = from_rotation_vector(yaw[:, None] * UP)
     ahead = np.stack([np.cos(yaw[0]), np.sin(yaw[0]), 0.0 * yaw[0]])
     turning = rate[0] * UP
@@ -137,7 +137,7 @@ def path_of_two_bends(rng: np.random.Generator, ticks: Ticks) -> tuple[Any, Path
 
 
 def gate(rng: np.random.Generator, ticks: Ticks) -> tuple[Any, Path3]:
-    """A bar of 3 m that begins to turn down about its end at some time, at 0.5 to 1.5 rad/s, for a quarter of a turn."""
+    """A bar of 3 m that begins to turn down about its end later, at 0.5 to 1.5 rad/s, for a quarter of a turn."""
     begin, rate = rng.uniform(0.3, 3.0), rng.uniform(0.5, 1.5)
     angle = np.clip((ticks - begin) * rate, 0.0, np.pi / 2)
     return turned_rod(angle, 0.0, ticks, cm.Box((3.0, 0.1, 0.1)), 1.5)
@@ -252,7 +252,7 @@ def between(poses: Array, at: Array, share: float) -> Array:
 
 
 def true_time(it: Encounter, ticks: Ticks) -> float:
-    """First time (s) at which the bodies touch, infinite for never. Near each other, they are compared between ticks."""
+    """First time (s) at which the bodies touch, infinite: never. Near each other, it looks between ticks."""
     poses = it.paths[0].poses(), it.paths[1].poses()
     found = cm.contacts(it.shapes[0], poses[0], it.shapes[1], poses[1]).signed_distance
     at = np.flatnonzero(np.minimum(found[1:], found[:-1]) < NEAR)
@@ -385,9 +385,7 @@ def main() -> int:
     args = parser.parse_args()
     count, ticks = 200 if args.quick else args.count, np.arange(0.0, HORIZONS[-1] + TICK, TICK)
     results: dict[tuple[str, str, float], Score] = {}
-    print(
-        "| What moves | the monitor is told | horizon (s) | true | false | missed | late | error of the time, p99 (ms) |"
-    )
+    print("| What moves | the monitor is told | horizon (s) | true | false | missed | late | error p99 (ms) |")
     print("|---|---|---|---|---|---|---|---|")
     for kind in KINDS:
         if args.only not in kind.name:

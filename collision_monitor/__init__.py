@@ -52,6 +52,8 @@ _HOME = {
     "contacts": "query.contact.contacts",
     "Contacts": "query.contact.contacts",
     "times_of_impact": "query.impact.times_of_impact",
+    "impacts": "query.impact.contact_intervals",
+    "ContactInterval": "query.impact.contact_intervals",
     "contains": "query.points.containment",
     "cast_ray": "query.points.rays",
     "points_within": "query.points.points_within",
@@ -114,6 +116,8 @@ if TYPE_CHECKING:
     from collision_monitor.query.contact.distance import distance as distance
     from collision_monitor.query.contact.features_in_contact import contact_features as contact_features
     from collision_monitor.query.contact.overlap import overlap as overlap
+    from collision_monitor.query.impact.contact_intervals import ContactInterval as ContactInterval
+    from collision_monitor.query.impact.contact_intervals import impacts as impacts
     from collision_monitor.query.impact.feature_impact import FeatureImpact as FeatureImpact
     from collision_monitor.query.impact.feature_impact import edge_edge_impact as edge_edge_impact
     from collision_monitor.query.impact.feature_impact import vertex_face_impact as vertex_face_impact

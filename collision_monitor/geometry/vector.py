@@ -85,7 +85,7 @@ def sum_of_sizes(v: Vector) -> float:
 
 
 @inlined
-def norm(v: Vector) -> float:
+def magnitude(v: Vector) -> float:
     """Length of v."""
     return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
 

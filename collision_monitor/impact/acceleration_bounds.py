@@ -15,7 +15,7 @@ from collision_monitor.geometry.vector import Vector
 from collision_monitor.impact.body_impact import ShapePair, Tube, Window, contact_at, shape_impact
 from collision_monitor.impact.impact_record import CLEAR, UNRESOLVED
 from collision_monitor.motion.bodies import next_pair
-from collision_monitor.motion.motion import carry_on
+from collision_monitor.motion.last_state import carry_on
 from collision_monitor.narrow_phase.contact_row import BOUND
 
 SEGMENTS: Final = 8
@@ -95,7 +95,7 @@ def _deviation(a_i: float, age_i: float, a_j: float, age_j: float) -> Vector:
 def first_possible_impacts(
     multibody: Any, spread: Any, pairs: Any, now: float, horizon: float, query: Any, work: Any, first: Any
 ) -> None:
-    """Write when pairs (P, 2) of body slots may meet at the earliest (s from now), as their bounds allow, to first (P,).
+    """Write to first (P,) when pairs (P, 2) of body slots may meet at the earliest (s from now), as their bounds allow.
 
     Infinite: not within the horizon (s), or no bound is declared.
     """

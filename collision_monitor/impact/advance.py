@@ -21,6 +21,7 @@ from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.vector import Vector, cross, dot
+from collision_monitor.motion.motion import angular_velocity_at, change_at, relative_velocity
 from collision_monitor.narrow_phase.core import rounding
 from collision_monitor.shapes.calls import core_box, core_support, is_centred_box
 from collision_monitor.shapes.kinds.sphere import SPHERE
@@ -44,6 +45,15 @@ class Placed(NamedTuple):
     w_a: Any
     w_b: Any
     change: Any  # PairChange
+
+
+@inlined
+def moving_shapes(pair: Any, placed: Any, t: float, span: float) -> Placed:
+    """A pair of shapes (ShapePair) that is placed at time t (PlacedPair), with how it moves in a span (s) after it."""
+    A, B, a, b = pair
+    oa, ob, p, pose = placed
+    v, w_a, w_b = relative_velocity(A, B, t), angular_velocity_at(A, t), angular_velocity_at(B, t)
+    return Placed(a, b, pose.R_A, pose.R_B, oa, ob, p, v, w_a, w_b, change_at(A, B, t, span))
 
 
 class Gap(NamedTuple):

@@ -9,7 +9,7 @@ from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.impact.body_impact import CLOSING, closing_speed
 from collision_monitor.impact.mesh_pair import SURFACES, shapes_overlap, shapes_within
 from collision_monitor.motion.bodies import next_pair, place_shape
-from collision_monitor.motion.motion import (
+from collision_monitor.motion.last_state import (
     age_of,
     angular_now,
     position_now,

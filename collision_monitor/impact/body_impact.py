@@ -15,7 +15,7 @@ import numpy as np
 from collision_monitor._jit import device, inlined, outlined
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.geometry.vector import Vector
-from collision_monitor.impact.advance import Placed, advance_along_axis
+from collision_monitor.impact.advance import advance_along_axis, moving_shapes
 from collision_monitor.impact.impact_record import (
     CLEAR,
     CLOSED_FORM,
@@ -30,20 +30,17 @@ from collision_monitor.impact.overlap_time import overlap_time
 from collision_monitor.impact.sphere_interval import meeting_of_spheres, relative_motion_at, sphere_interval
 from collision_monitor.impact.tree_impact import FULL
 from collision_monitor.meshes.distance.nearest import MEMORY, PLACE_A, PLACE_B, answer_row
-from collision_monitor.motion.bodies import next_pair, place_shape
+from collision_monitor.motion.bodies import next_pair
 from collision_monitor.motion.motion import (
     angular_velocity_at,
-    change_at,
     half_acceleration,
     position_at,
-    relative_position,
     relative_velocity,
-    rotation_at,
     smooth_until,
 )
+from collision_monitor.motion.placed_pair import place_pair
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.dispatch import separation
-from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.work_memory import WORK_SIZE
 from collision_monitor.tolerances import EPSILON
 
@@ -149,7 +146,6 @@ def shape_impact(
     if has_mesh(table, a, b):
         return mesh_impact(table, parts, pair, window, tube, query, FULL, scratch)
     begin, end = window
-    R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
     n_before = AT_REST
     t = t_before = begin
@@ -157,13 +153,8 @@ def shape_impact(
     status, iteration, guess = UNRESOLVED, 0, 0.0
     while iteration < query.iterations:
         iteration += 1
-        rotation_at(A, t, R_i)
-        rotation_at(B, t, R_j)
-        oa = place_shape(table, parts, a, R_i, R_a)
-        ob = place_shape(table, parts, b, R_j, R_b)
-        px, py, pz = relative_position(A, B, t)
-        pose = PairPose(R_a, R_b, (px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2]))
-        gap = separation(table, a, b, pose, out, scratch.work)
+        placed = place_pair(table, parts, pair, t, scratch)
+        gap = separation(table, a, b, placed.pose, out, scratch.work)
         gap -= query.margin + tube.start + tube.growth * (t - begin)
         if gap <= query.tolerance:
             if t > t_before:
@@ -171,10 +162,8 @@ def shape_impact(
                 guess = wanted * (t - t_before) / (gap_before - gap)
             status = HIT
             break
-        n, v = (out[0], out[1], out[2]), relative_velocity(A, B, t)
-        border = min(end, smooth_until(A, B, t))
-        w_a, w_b, change = angular_velocity_at(A, t), angular_velocity_at(B, t), change_at(A, B, t, border - t)
-        at = Placed(a, b, R_a, R_b, oa, ob, (px, py, pz), v, w_a, w_b, change)
+        n, border = (out[0], out[1], out[2]), min(end, smooth_until(A, B, t))
+        at = moving_shapes(pair, placed, t, border - t)
         # aim at half the tolerance, so that the last advance ends inside it
         aim = gap - 0.5 * query.tolerance
         d, m, until = 0.0, AT_REST, border - t
@@ -211,14 +200,8 @@ def contact_at(table: Any, parts: Any, pair: ShapePair, t: float, scratch: Scrat
 def _contact_at(table: Any, parts: Any, pair: ShapePair, t: float, places: Any, scratch: Scratch) -> float:
     """`contact_at`, or if there are places of two triangles (mesh_pair.py), the contact of these."""
     A, B, a, b = pair
-    R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
-    rotation_at(A, t, R_i)
-    rotation_at(B, t, R_j)
-    oa = place_shape(table, parts, a, R_i, R_a)
-    ob = place_shape(table, parts, b, R_j, R_b)
-    p = relative_position(A, B, t)
-    pose = PairPose(R_a, R_b, (p[0] + ob[0] - oa[0], p[1] + ob[1] - oa[1], p[2] + ob[2] - oa[2]))
+    oa, _, p, pose = place_pair(table, parts, pair, t, scratch)
     if places[0] >= 0:
         triangles_contact(table, a, b, pose, places, out)
     else:

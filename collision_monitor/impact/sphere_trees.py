@@ -19,7 +19,7 @@ from collision_monitor.geometry.vector import Vector, cross
 from collision_monitor.impact.body_impact import Window, tube_of
 from collision_monitor.impact.impact_record import CLEAR, TREE_BOUND
 from collision_monitor.impact.sphere_interval import meeting_of_spheres, relative_motion_at, sphere_interval
-from collision_monitor.motion.motion import angular_velocity_at, change_at, half_acceleration, rotation_at, turning_rate
+from collision_monitor.motion.motion import angular_velocity_at, change_at, half_acceleration, most_turning, rotation_at
 from collision_monitor.shapes.kinds.box import BOX
 from collision_monitor.shapes.kinds.convex_hull import CONVEX_HULL
 from collision_monitor.tolerances import ROUNDED_UP
@@ -161,7 +161,7 @@ def _ball(trees: Trees, at: int, m: Any, R: Any, w: Vector, turning: Any, span: 
 @inlined
 def _turning(m: Any, begin: float, end: float, harder: Vector) -> tuple[float, float]:
     """Largest angular speed of a motion in a span (rad/s), and the magnitude of its angular acceleration (rad/s^2)."""
-    return turning_rate(m, begin, end), sqrt(harder[0] * harder[0] + harder[1] * harder[1] + harder[2] * harder[2])
+    return most_turning(m, begin, end), sqrt(harder[0] * harder[0] + harder[1] * harder[1] + harder[2] * harder[2])
 
 
 @device

@@ -13,7 +13,7 @@ from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined, outlined
-from collision_monitor.geometry.vector import cross, dot, minus, norm, plus, rotate_back
+from collision_monitor.geometry.vector import cross, dot, magnitude, minus, plus, rotate_back
 from collision_monitor.impact.impact_record import CLEAR, HIT, UNRESOLVED
 from collision_monitor.meshes.advance.approach import Approach, seen_from_b
 from collision_monitor.meshes.advance.box_times import box_times
@@ -22,18 +22,16 @@ from collision_monitor.meshes.distance.contact import reach_in
 from collision_monitor.meshes.distance.nearest import BOUNDS, MOST_PAIRS, PAIRS, PLACE_A, PLACE_B, opens_b, size_of
 from collision_monitor.meshes.layout import CENTER, CHILD, HALF, WIDTH
 from collision_monitor.meshes.placing import inverse, place_point, relative
-from collision_monitor.motion.bodies import place_shape
 from collision_monitor.motion.motion import (
     angular_velocity_at,
     are_straight,
     change_at,
     half_acceleration,
-    relative_position,
+    most_turning,
     relative_velocity,
-    rotation_at,
     smooth_until,
-    turning_rate,
 )
+from collision_monitor.motion.placed_pair import place_pair
 from collision_monitor.shapes.shape_table import TREE
 from collision_monitor.tolerances import EPSILON
 
@@ -173,13 +171,10 @@ def tree_approach_at(
     contact (m). until: time at which the search ends (s).
     """
     A, B, a, b = pair
-    R_a, R_b = scratch.rotation[2], scratch.rotation[3]
-    rotation_at(A, t, scratch.rotation[0])
-    rotation_at(B, t, scratch.rotation[1])
-    o_a = place_shape(table, parts, a, scratch.rotation[0], R_a)
-    o_b = place_shape(table, parts, b, scratch.rotation[1], R_b)
+    R_a = scratch.rotation[2]
+    o_a, o_b, p, _ = place_pair(table, parts, pair, t, scratch)
     w_a, w_b = angular_velocity_at(A, t), angular_velocity_at(B, t)
-    p, v = relative_position(A, B, t), relative_velocity(A, B, t)
+    v = relative_velocity(A, B, t)
     # the shapes' origins turn about those of their bodies
     turn_a, turn_b = cross(w_a, o_a), cross(w_b, o_b)
     change = change_at(A, B, t, until - t)
@@ -190,8 +185,8 @@ def tree_approach_at(
     bend = sqrt(dot(own, own))
     if not are_straight(A, B):
         bend = 2.0 * half_acceleration(A, B, t, until)
-        harder_a, harder_b = norm(change.turning_a), norm(change.turning_b)
-        bend_a, bend_b = turning_rate(A, t, until) ** 2 + harder_a, turning_rate(B, t, until) ** 2 + harder_b
+        harder_a, harder_b = magnitude(change.turning_a), magnitude(change.turning_b)
+        bend_a, bend_b = most_turning(A, t, until) ** 2 + harder_a, most_turning(B, t, until) ** 2 + harder_b
         if harder_a + harder_b > 0.0 or smooth_until(A, B, t) < until:
             jerk = UNBOUNDED  # the largest acceleration of any time bounds the gaps alone
     return minus(plus(p, o_b), o_a), Approach(

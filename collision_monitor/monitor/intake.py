@@ -13,7 +13,7 @@ from collision_monitor._jit import device, inlined, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor.checks.numbers import as_numbers, hides_some
 from collision_monitor.errors import InputError, Refusal
-from collision_monitor.geometry.vector import Vector, cross, dot, norm
+from collision_monitor.geometry.vector import Vector, cross, dot, magnitude
 from collision_monitor.monitor.refusals import Refusals, some_ids
 from collision_monitor.monitor.state.roster import Roster
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
@@ -423,7 +423,7 @@ def _bend_twist(bodies: Any, i: int, elapsed: float) -> None:
     """
     v = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
     w = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
-    half = 0.5 * elapsed * norm(w)
+    half = 0.5 * elapsed * magnitude(w)
     if not (half > 0.0 and dot(w, w) > 0.0):
         return
     along, longer = dot(w, v) / dot(w, w), half / sin_cos(half)[0]

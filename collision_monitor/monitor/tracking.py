@@ -16,22 +16,15 @@ from numpy.typing import NDArray
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor.broad_phase.hashed_grid import HashedGrid, put_box, remove_boxes
-from collision_monitor.geometry.vector import minus, norm, scaled
+from collision_monitor.geometry.vector import magnitude, minus, scaled
 from collision_monitor.monitor import filters
 from collision_monitor.monitor.adaptive_tubes import FUTILE_STEPS, NARROWEST, PATIENCE, Unrest, fit_width, widest_tube
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
 from collision_monitor.motion.course import STRAIGHT
-from collision_monitor.motion.motion import (
-    age_of,
-    place_at,
-    position_now,
-    set_reference,
-    swept_box,
-    twist_at,
-    twist_now,
-)
+from collision_monitor.motion.last_state import age_of, position_now, set_reference, twist_now
+from collision_monitor.motion.motion import place_at, swept_box, twist_at
 from collision_monitor.motion.turning import BLOCK, COLUMNS, make_columns, turned_away
 from collision_monitor.uncertainty.spread import surface_spread, swing_radius
 
@@ -272,12 +265,13 @@ def _course_deviation(
         return inf, inf
     moved, p = place_at(m, now).moved, position_now(bodies, i, age)
     own, other = twist_now(bodies, i, age), twist_at(m, now)
-    apart = norm((p[0] - (m.x + moved[0]), p[1] - (m.y + moved[1]), p[2] - (m.z + moved[2])))
-    off = norm(minus(own.angular, other.angular))
-    slower = norm(minus(scaled(own.velocity, own.change), scaled(other.velocity, other.change)))
-    bend = norm(minus(scaled(own.angular, own.change), scaled(other.angular, other.change)))
-    fastest = max(norm(own.velocity), norm(other.velocity)) * (1.0 + 2.0 * horizon * max(own.change, other.change, 0.0))
-    drift = norm(minus(own.velocity, other.velocity))
+    apart = magnitude((p[0] - (m.x + moved[0]), p[1] - (m.y + moved[1]), p[2] - (m.z + moved[2])))
+    off = magnitude(minus(own.angular, other.angular))
+    slower = magnitude(minus(scaled(own.velocity, own.change), scaled(other.velocity, other.change)))
+    bend = magnitude(minus(scaled(own.angular, own.change), scaled(other.angular, other.change)))
+    fastest = max(magnitude(own.velocity), magnitude(other.velocity))
+    fastest *= 1.0 + 2.0 * horizon * max(own.change, other.change, 0.0)
+    drift = magnitude(minus(own.velocity, other.velocity))
     drift += horizon * (slower + fastest * (off + 2.0 / 3.0 * horizon * bend))
     apart += 0.5 * stale_acceleration * age * age
     drift += stale_acceleration * age

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from collision_monitor._jit import kernel
 from collision_monitor.motion.bodies import BodyTable
 from collision_monitor.motion.course import STRAIGHT
-from collision_monitor.motion.motion import age_of, bending_now, position_now, twist_now, velocity_now
+from collision_monitor.motion.last_state import age_of, bending_now, position_now, twist_now, velocity_now
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.impact.body_contact import relative_now
 from collision_monitor.impact.sphere_interval import sphere_interval
 from collision_monitor.motion.course import STRAIGHT
-from collision_monitor.motion.motion import bending_now
+from collision_monitor.motion.last_state import bending_now
 from collision_monitor.shapes.kinds.box import BOX
 from collision_monitor.uncertainty.spread import is_uncertain, surface_spread, swing_radius
 

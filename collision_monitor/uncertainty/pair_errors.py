@@ -6,7 +6,7 @@ from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.geometry.vector import Vector, dot, norm
+from collision_monitor.geometry.vector import Vector, dot, magnitude
 from collision_monitor.motion.motion import are_straight, relative_position, relative_velocity
 from collision_monitor.uncertainty.samples.error_samples import (
     LEFT_OVER,
@@ -191,7 +191,7 @@ def straight_length(A: Any, B: Any, errors: PairErrors, bending: float) -> float
     """
     speed = sqrt((B.vx - A.vx) ** 2 + (B.vy - A.vy) ** 2 + (B.vz - A.vz) ** 2)
     if not are_straight(A, B):
-        speed = norm((A.vx, A.vy, A.vz)) + norm((B.vx, B.vy, B.vz))
+        speed = magnitude((A.vx, A.vy, A.vz)) + magnitude((B.vx, B.vy, B.vz))
     rate = spin_rate(A) if errors.radius[0] > 0.0 else 0.0  # the rotation of a ball moves nothing
     rate += spin_rate(B) if errors.radius[1] > 0.0 else 0.0
     rate += TURNED * turning_rate(errors)

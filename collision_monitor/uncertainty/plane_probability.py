@@ -13,7 +13,8 @@ from typing import Any, Final
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.impact.body_impact import ImpactQuery, ShapePair, Tube, Window
 from collision_monitor.impact.sphere_interval import sphere_interval
-from collision_monitor.motion.motion import carry_on, half_acceleration
+from collision_monitor.motion.last_state import carry_on
+from collision_monitor.motion.motion import half_acceleration
 from collision_monitor.uncertainty.impact_distribution import (
     EARLIEST,
     EVENLY_OUTWARD,

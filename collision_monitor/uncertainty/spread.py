@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor.geometry.vector import norm
+from collision_monitor.geometry.vector import magnitude
 from collision_monitor.motion.course import ARC
 from collision_monitor.records import StateFlag
 
@@ -174,5 +174,5 @@ def surface_spread(
         if bodies.course[i] == ARC:
             v = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
             off = s_o + s_w * (age + ahead) + 0.5 * turning * (age + ahead) * (age + ahead)
-            now, growth = now + norm(v) * age * off, growth + norm(v) * off
+            now, growth = now + magnitude(v) * age * off, growth + magnitude(v) * off
     return now, growth

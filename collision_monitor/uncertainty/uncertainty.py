@@ -28,7 +28,8 @@ from collision_monitor.impact.impact_record import CLEAR
 from collision_monitor.impact.sphere_interval import sphere_interval
 from collision_monitor.impact.tree_impact import spins
 from collision_monitor.motion.bodies import next_pair
-from collision_monitor.motion.motion import are_straight, carry_on, half_acceleration, relative_position
+from collision_monitor.motion.last_state import carry_on
+from collision_monitor.motion.motion import are_straight, half_acceleration, relative_position
 from collision_monitor.narrow_phase.contact_row import NORMAL, POINT_A, POINT_B
 from collision_monitor.shapes.kinds.mesh import MESH
 from collision_monitor.shapes.kinds.points import POINTS

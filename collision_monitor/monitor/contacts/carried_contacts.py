@@ -33,7 +33,8 @@ from collision_monitor.monitor.contacts.carried_triangles import (
     meets_by_trees,
     turning,
 )
-from collision_monitor.motion.motion import age_of, chord_angle, position_now, quaternion_now
+from collision_monitor.motion.last_state import age_of, position_now, quaternion_now
+from collision_monitor.motion.motion import chord_angle
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B
 
 RELATIVE: Final = RESULT

@@ -32,7 +32,7 @@ from collision_monitor.meshes.distance.feature import (
 from collision_monitor.meshes.distance.triangle_pair import Corners
 from collision_monitor.meshes.extent import farthest
 from collision_monitor.motion.bodies import place_shape
-from collision_monitor.motion.motion import age_of, position_now, rotation_now
+from collision_monitor.motion.last_state import age_of, position_now, rotation_now
 from collision_monitor.narrow_phase.contact_row import (
     BOUND,
     DISTANCE,

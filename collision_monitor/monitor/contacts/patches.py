@@ -17,7 +17,7 @@ from collision_monitor.impact.body_contact import SHAPE_I, SHAPE_J, STATUS, TOUC
 from collision_monitor.impact.mesh_pair import has_mesh
 from collision_monitor.monitor.active_pairs import Active
 from collision_monitor.motion.bodies import Multibody, next_pair, place_shape
-from collision_monitor.motion.motion import position_now, rotation_now
+from collision_monitor.motion.last_state import position_now, rotation_now
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.narrow_phase.manifold import CORNERS, manifold_batch, reduce_points
