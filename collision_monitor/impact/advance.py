@@ -21,7 +21,7 @@ from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.vector import Vector, cross, dot
-from collision_monitor.motion.motion import angular_velocity_at, change_at, relative_velocity
+from collision_monitor.motion.motion import change_at
 from collision_monitor.narrow_phase.core import rounding
 from collision_monitor.shapes.calls import core_box, core_support, is_centred_box
 from collision_monitor.shapes.kinds.sphere import SPHERE
@@ -48,12 +48,12 @@ class Placed(NamedTuple):
 
 
 @inlined
-def moving_shapes(pair: Any, placed: Any, t: float, span: float) -> Placed:
+def in_motion(pair: Any, placed: Any, t: float, span: float) -> Placed:
     """A pair of shapes (ShapePair) that is placed at time t (PlacedPair), with how it moves in a span (s) after it."""
     A, B, a, b = pair
-    oa, ob, p, pose = placed
-    v, w_a, w_b = relative_velocity(A, B, t), angular_velocity_at(A, t), angular_velocity_at(B, t)
-    return Placed(a, b, pose.R_A, pose.R_B, oa, ob, p, v, w_a, w_b, change_at(A, B, t, span))
+    oa, ob, pose, state = placed
+    change = change_at(A, B, state, t, span)
+    return Placed(a, b, pose.R_A, pose.R_B, oa, ob, state.p, state.v, state.w_a, state.w_b, change)
 
 
 class Gap(NamedTuple):

@@ -15,7 +15,7 @@ import numpy as np
 from collision_monitor._jit import device, inlined, outlined
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.geometry.vector import Vector
-from collision_monitor.impact.advance import advance_along_axis, moving_shapes
+from collision_monitor.impact.advance import advance_along_axis, in_motion
 from collision_monitor.impact.impact_record import (
     CLEAR,
     CLOSED_FORM,
@@ -32,10 +32,8 @@ from collision_monitor.impact.tree_impact import FULL
 from collision_monitor.meshes.distance.nearest import MEMORY, PLACE_A, PLACE_B, answer_row
 from collision_monitor.motion.bodies import next_pair
 from collision_monitor.motion.motion import (
-    angular_velocity_at,
     half_acceleration,
     position_at,
-    relative_velocity,
     smooth_until,
 )
 from collision_monitor.motion.placed_pair import place_pair
@@ -163,16 +161,17 @@ def shape_impact(
             status = HIT
             break
         n, border = (out[0], out[1], out[2]), min(end, smooth_until(A, B, t))
-        at = moving_shapes(pair, placed, t, border - t)
+        at = in_motion(pair, placed, t, border - t)
         # aim at half the tolerance, so that the last advance ends inside it
         aim = gap - 0.5 * query.tolerance
         d, m, until = 0.0, AT_REST, border - t
         for turns in range(2):
             d = max(d, advance_along_axis(table, at, n, m, -tube.growth, aim, until))
-            if turns or t == t_before or d >= until:
+            if turns or (t == t_before and at.change.jerk == 0.0) or d >= until:
                 break
-            m = _turning(n_before, n, t - t_before)
-            if m[0] == 0.0 and m[1] == 0.0 and m[2] == 0.0:
+            if t > t_before:
+                m = _turning(n_before, n, t - t_before)
+            if m[0] == 0.0 and m[1] == 0.0 and m[2] == 0.0 and at.change.jerk == 0.0:
                 break
             until = min(until, FARTHER * d)
         t_before, gap_before, n_before = t, gap, n
@@ -199,9 +198,8 @@ def contact_at(table: Any, parts: Any, pair: ShapePair, t: float, scratch: Scrat
 @outlined
 def _contact_at(table: Any, parts: Any, pair: ShapePair, t: float, places: Any, scratch: Scratch) -> float:
     """`contact_at`, or if there are places of two triangles (mesh_pair.py), the contact of these."""
-    A, B, a, b = pair
-    out = scratch.out
-    oa, _, p, pose = place_pair(table, parts, pair, t, scratch)
+    a, b, out = pair.a, pair.b, scratch.out
+    oa, _, pose, state = place_pair(table, parts, pair, t, scratch)
     if places[0] >= 0:
         triangles_contact(table, a, b, pose, places, out)
     else:
@@ -209,8 +207,7 @@ def _contact_at(table: Any, parts: Any, pair: ShapePair, t: float, places: Any, 
     for k in range(3):
         out[POINT_A + k] += oa[k]
         out[POINT_B + k] += oa[k]
-    v = relative_velocity(A, B, t)
-    out[CLOSING] = closing_speed(v, angular_velocity_at(A, t), angular_velocity_at(B, t), p, out)
+    out[CLOSING] = closing_speed(state.v, state.w_a, state.w_b, state.p, out)
     return out[DISTANCE]
 
 

@@ -33,10 +33,9 @@ from collision_monitor.impact.sphere_interval import meeting_of_spheres, relativ
 from collision_monitor.impact.tree_impact import SearchEnd, tree_approach_at
 from collision_monitor.motion.bodies import place_shape
 from collision_monitor.motion.motion import (
-    angular_velocity_at,
     half_acceleration,
+    pair_state,
     position_at,
-    relative_position,
     relative_velocity,
 )
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B
@@ -57,8 +56,8 @@ def _write_hit(pair: ShapePair, t: float, event: Any, out: Any) -> None:
     event.point_y = y + 0.5 * (out[POINT_A + 1] + out[POINT_B + 1])
     event.point_z = z + 0.5 * (out[POINT_A + 2] + out[POINT_B + 2])
     event.normal_x, event.normal_y, event.normal_z = out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]
-    v, p = relative_velocity(A, B, t), relative_position(A, B, t)
-    event.closing_speed = closing_speed(v, angular_velocity_at(A, t), angular_velocity_at(B, t), p, out)
+    state = pair_state(A, B, t)
+    event.closing_speed = closing_speed(state.v, state.w_a, state.w_b, state.p, out)
 
 
 @device

@@ -19,7 +19,7 @@ from collision_monitor.geometry.vector import Vector, cross
 from collision_monitor.impact.body_impact import Window, tube_of
 from collision_monitor.impact.impact_record import CLEAR, TREE_BOUND
 from collision_monitor.impact.sphere_interval import meeting_of_spheres, relative_motion_at, sphere_interval
-from collision_monitor.motion.motion import angular_velocity_at, change_at, half_acceleration, most_turning, rotation_at
+from collision_monitor.motion.motion import change_at, half_acceleration, most_turning, pair_state, rotation_at
 from collision_monitor.shapes.kinds.box import BOX
 from collision_monitor.shapes.kinds.convex_hull import CONVEX_HULL
 from collision_monitor.tolerances import ROUNDED_UP
@@ -187,16 +187,17 @@ def tree_meeting(bodies: Any, trees: Trees, i: int, j: int, window: Window, marg
     rotation_at(B, begin + soonest, R_j)
     wide = (margin + (tube.start + growth * soonest)) * (1.0 + 1e-12)
     start = begin + soonest
-    change = change_at(A, B, start, span)
+    state = pair_state(A, B, start)
+    change = change_at(A, B, state, start, span)
     turning_a, turning_b = _turning(A, start, end, change.turning_a), _turning(B, start, end, change.turning_b)
-    w_a, w_b = angular_velocity_at(A, start), angular_velocity_at(B, start)
     stack = trees.stack
     stack[0, 0], stack[0, 1] = trees.root[i], trees.root[j]
     waiting, best = 1, inf
     while waiting > 0:  # terminates: each pair of spheres is removed once, and adds two with the halves of one
         waiting -= 1
         a, b = stack[waiting, 0], stack[waiting, 1]
-        ball_a, ball_b = _ball(trees, a, A, R_i, w_a, turning_a, span), _ball(trees, b, B, R_j, w_b, turning_b, span)
+        ball_a = _ball(trees, a, A, R_i, state.w_a, turning_a, span)
+        ball_b = _ball(trees, b, B, R_j, state.w_b, turning_b, span)
         d = (px + (ball_b.p[0] - ball_a.p[0]), py + (ball_b.p[1] - ball_a.p[1]), pz + (ball_b.p[2] - ball_a.p[2]))
         u = (
             v[0] + (ball_b.v[0] - ball_a.v[0]),

@@ -12,7 +12,7 @@ from typing import Any, Final
 
 from collision_monitor._jit import inlined, outlined
 from collision_monitor.geometry.vector import Vector, cross, dot, minus, opposite, rotate_back
-from collision_monitor.impact.advance import Placed, advance_along_axis, moving_shapes
+from collision_monitor.impact.advance import Placed, advance_along_axis, in_motion
 from collision_monitor.impact.body_impact import AT_REST
 from collision_monitor.motion.motion import PairChange, smooth_until
 from collision_monitor.motion.placed_pair import place_pair
@@ -113,7 +113,7 @@ def touching_impact(
         if gap > apart:
             return PARTS, t
         border = min(end, smooth_until(A, B, t))
-        at = _rolling(table, moving_shapes(pair, placed, t, border - t), n)
+        at = _rolling(table, in_motion(pair, placed, t, border - t), n)
         d = advance_along_axis(table, at, n, AT_REST, 0.0, gap + skin, border - t)
         share = 1.0
         for _halving in range(HALVINGS):  # the latest time of these at which they are apart along the direction

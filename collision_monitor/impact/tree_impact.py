@@ -23,12 +23,10 @@ from collision_monitor.meshes.distance.nearest import BOUNDS, MOST_PAIRS, PAIRS,
 from collision_monitor.meshes.layout import CENTER, CHILD, HALF, WIDTH
 from collision_monitor.meshes.placing import inverse, place_point, relative
 from collision_monitor.motion.motion import (
-    angular_velocity_at,
     are_straight,
     change_at,
     half_acceleration,
     most_turning,
-    relative_velocity,
     smooth_until,
 )
 from collision_monitor.motion.placed_pair import place_pair
@@ -172,12 +170,11 @@ def tree_approach_at(
     """
     A, B, a, b = pair
     R_a = scratch.rotation[2]
-    o_a, o_b, p, _ = place_pair(table, parts, pair, t, scratch)
-    w_a, w_b = angular_velocity_at(A, t), angular_velocity_at(B, t)
-    v = relative_velocity(A, B, t)
+    o_a, o_b, _, state = place_pair(table, parts, pair, t, scratch)
+    p, v, w_a, w_b, _, _ = state
     # the shapes' origins turn about those of their bodies
     turn_a, turn_b = cross(w_a, o_a), cross(w_b, o_b)
-    change = change_at(A, B, t, until - t)
+    change = change_at(A, B, state, t, until - t)
     own, jerk = change.acceleration, change.jerk
     bend_a, bend_b = dot(w_a, w_a), dot(w_b, w_b)
     jerk_a, jerk_b = bend_a * sqrt(bend_a), bend_b * sqrt(bend_b)

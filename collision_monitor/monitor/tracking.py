@@ -23,8 +23,8 @@ from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
 from collision_monitor.motion.course import STRAIGHT
-from collision_monitor.motion.last_state import age_of, position_now, set_reference, twist_now
-from collision_monitor.motion.motion import place_at, swept_box, twist_at
+from collision_monitor.motion.last_state import age_of, set_reference, twist_now
+from collision_monitor.motion.motion import swept_box, twist_at
 from collision_monitor.motion.turning import BLOCK, COLUMNS, make_columns, turned_away
 from collision_monitor.uncertainty.spread import surface_spread, swing_radius
 
@@ -263,12 +263,14 @@ def _course_deviation(
     age = now - bodies.time[i]
     if m.course != bodies.course[i] or (m.rest < inf) != (bodies.rest[i] < inf):
         return inf, inf
-    moved, p = place_at(m, now).moved, position_now(bodies, i, age)
     own, other = twist_now(bodies, i, age), twist_at(m, now)
-    apart = magnitude((p[0] - (m.x + moved[0]), p[1] - (m.y + moved[1]), p[2] - (m.z + moved[2])))
+    p, x, y, z = bodies.position, other.moved[0] + m.x, other.moved[1] + m.y, other.moved[2] + m.z
+    apart = magnitude((p[i, 0] - x + own.moved[0], p[i, 1] - y + own.moved[1], p[i, 2] - z + own.moved[2]))
     off = magnitude(minus(own.angular, other.angular))
-    slower = magnitude(minus(scaled(own.velocity, own.change), scaled(other.velocity, other.change)))
-    bend = magnitude(minus(scaled(own.angular, own.change), scaled(other.angular, other.change)))
+    slower = bend = 0.0
+    if own.change != 0.0 or other.change != 0.0:
+        slower = magnitude(minus(scaled(own.velocity, own.change), scaled(other.velocity, other.change)))
+        bend = magnitude(minus(scaled(own.angular, own.change), scaled(other.angular, other.change)))
     fastest = max(magnitude(own.velocity), magnitude(other.velocity))
     fastest *= 1.0 + 2.0 * horizon * max(own.change, other.change, 0.0)
     drift = magnitude(minus(own.velocity, other.velocity))

@@ -128,6 +128,8 @@ def _screw(v: Vector, w: Vector, s: float) -> tuple[Vector, Vector]:
 @outlined
 def place_on(kind: int, v: Vector, w: Vector, a: Vector, t: float, rest: float) -> Place:
     """Where a body is t (s) after its state: velocity v, angular velocity w, acceleration a and rest of its Course."""
+    if t == 0.0 < rest:
+        return Place(STILL, v, 1.0)
     stands, t = t >= rest, min(t, rest)
     if kind == STRAIGHT:
         half = 0.5 * t * t
@@ -142,9 +144,14 @@ def place_on(kind: int, v: Vector, w: Vector, a: Vector, t: float, rest: float) 
     return Place(moved, (rate * heading[0], rate * heading[1], rate * heading[2]), rate)
 
 
-@outlined
-def change_on(kind: int, v: Vector, w: Vector, a: Vector, t: float, rest: float, span: float) -> Change:
-    """How the motion of a body changes t (s) after its state, and in the span (s) after that, within its course."""
+@inlined
+def change_on(
+    kind: int, v: Vector, w: Vector, a: Vector, t: float, rest: float, span: float, now: Vector
+) -> Change:  # fmt: skip
+    """How the motion of a body changes t (s) after its state, and in the span (s) after that, within its course.
+
+    now: its velocity then (m/s).
+    """
     if t >= rest:
         return Change(STILL, 0.0, STILL)
     if kind == STRAIGHT:
@@ -153,15 +160,14 @@ def change_on(kind: int, v: Vector, w: Vector, a: Vector, t: float, rest: float,
     turning = (c * w[0], c * w[1], c * w[2])
     if kind == STOPPING:
         return Change(a, 0.0, turning)
-    _, heading = _screw(v, w, t + 0.5 * c * t * t)
-    rate, across = 1.0 + c * t, cross(w, heading)
+    rate, across, before = 1.0 + c * t, cross(w, now), cross(w, v)
+    along = c / rate if rate != 0.0 else 0.0
     most = max(abs(rate), abs(1.0 + c * (t + span)))
-    jerk = most * sqrt(dot(across, across)) * (3.0 * abs(c) + most * most * sqrt(dot(w, w)))
-    bent = rate * rate
+    jerk = most * sqrt(dot(before, before)) * (3.0 * abs(c) + most * most * sqrt(dot(w, w)))
     acceleration = (
-        c * heading[0] + bent * across[0],
-        c * heading[1] + bent * across[1],
-        c * heading[2] + bent * across[2],
+        along * now[0] + rate * across[0],
+        along * now[1] + rate * across[1],
+        along * now[2] + rate * across[2],
     )
     return Change(acceleration, jerk, turning)
 

@@ -160,13 +160,35 @@ def relative_velocity(A: Any, B: Any, t: float) -> Vector:
     )
 
 
+class PairState(NamedTuple):
+    """How two motions stand to each other at a time. World axes."""
+
+    p: Any  # (3,): position of B's origin relative to A's (m)
+    v: Any  # (3,): its velocity (m/s)
+    w_a: Any  # (3,): angular velocities (rad/s)
+    w_b: Any
+    place_a: Any  # Place on the course; unused of two straight motions
+    place_b: Any
+
+
 @inlined
-def angular_velocity_at(m: Any, t: float) -> Vector:
-    """Angular velocity of the motion m (MOTION) at time t (rad/s)."""
-    if m.course == STRAIGHT:
-        return m.wx, m.wy, m.wz
-    rate = place_at(m, t).rate
-    return rate * m.wx, rate * m.wy, rate * m.wz
+def pair_state(A: Any, B: Any, t: float) -> PairState:
+    """How motions A and B stand to each other at time t."""
+    w_a, w_b = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
+    if are_straight(A, B):
+        here = Place((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0)
+        return PairState(relative_position(A, B, t), relative_velocity(A, B, t), w_a, w_b, here, here)
+    a, b = place_at(A, t), place_at(B, t)
+    p = (
+        B.x - A.x + (b.moved[0] - a.moved[0]),
+        B.y - A.y + (b.moved[1] - a.moved[1]),
+        B.z - A.z + (b.moved[2] - a.moved[2]),
+    )
+    if A.course != STRAIGHT:
+        w_a = scaled(w_a, a.rate)
+    if B.course != STRAIGHT:
+        w_b = scaled(w_b, b.rate)
+    return PairState(p, minus(b.velocity, a.velocity), w_a, w_b, a, b)
 
 
 @inlined
@@ -203,17 +225,20 @@ class PairChange(NamedTuple):
 
 
 @inlined
-def _change_at(m: Any, t: float, span: float) -> Change:
+def _change_at(m: Any, there: Place, t: float, span: float) -> Change:
     v, w, a = (m.vx, m.vy, m.vz), (m.wx, m.wy, m.wz), (m.ax, m.ay, m.az)
-    return change_on(m.course, v, w, a, t - m.time, m.rest - m.time, span)
+    return change_on(m.course, v, w, a, t - m.time, m.rest - m.time, span, there.velocity)
 
 
 @inlined
-def change_at(A: Any, B: Any, t: float, span: float) -> PairChange:
-    """How motions A and B change at time t, and in the span (s) after it, which is within `smooth_until`."""
+def change_at(A: Any, B: Any, state: PairState, t: float, span: float) -> PairChange:
+    """How motions A and B change at time t, at which they are in a state, and in the span (s) after it.
+
+    The span is within `smooth_until`.
+    """
     if are_straight(A, B):
         return PairChange((B.ax - A.ax, B.ay - A.ay, B.az - A.az), 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    one, other = _change_at(A, t, span), _change_at(B, t, span)
+    one, other = _change_at(A, state.place_a, t, span), _change_at(B, state.place_b, t, span)
     return PairChange(
         minus(other.acceleration, one.acceleration), one.jerk + other.jerk, one.turning, other.turning
     )  # fmt: skip
@@ -313,6 +338,7 @@ def _swept_by_pieces(m: Any, begin: float, sweep: float, half: float) -> Region:
 class Twist(NamedTuple):
     """How a body moves at a time. World axes."""
 
+    moved: Any  # (3,): displacement of the origin since its state (m)
     velocity: Any  # (3,): m/s
     angular: Any  # (3,): rad/s
     change: Any  # of both, in parts of them per second (1/s); 0 on a straight course
@@ -323,7 +349,7 @@ def twist_on(kind: int, v: Vector, w: Vector, a: Vector, t: float, rest: float) 
     """How a body moves t (s) after its state, see `place_on`."""
     there = place_on(kind, v, w, a, t, rest)
     change = speed_change(v, a) / there.rate if kind != STRAIGHT and there.rate != 0.0 else 0.0
-    return Twist(there.velocity, scaled(w, there.rate), change)
+    return Twist(there.moved, there.velocity, scaled(w, there.rate), change)
 
 
 @inlined

@@ -6,20 +6,17 @@ from typing import Any, NamedTuple
 
 from collision_monitor._jit import inlined
 from collision_monitor.motion.bodies import place_shape
-from collision_monitor.motion.motion import relative_position, rotation_at
+from collision_monitor.motion.motion import pair_state, rotation_at
 from collision_monitor.narrow_phase.pair_pose import PairPose
 
 
 class PlacedPair(NamedTuple):
-    """Offsets of two shapes from their bodies' origins, position of B's origin relative to A's, and the shapes' poses.
+    """Two shapes at a time. World axes."""
 
-    World axes, m.
-    """
-
-    offset_a: Any  # (3,)
+    offset_a: Any  # (3,): offsets from their bodies' origins (m)
     offset_b: Any
-    p: Any
-    pose: Any  # PairPose
+    pose: Any  # PairPose of the shapes
+    state: Any  # PairState of the bodies
 
 
 @inlined
@@ -33,5 +30,6 @@ def place_pair(table: Any, parts: Any, pair: Any, t: float, scratch: Any) -> Pla
     rotation_at(A, t, R_i)
     rotation_at(B, t, R_j)
     oa, ob = place_shape(table, parts, a, R_i, R_a), place_shape(table, parts, b, R_j, R_b)
-    x, y, z = relative_position(A, B, t)
-    return PlacedPair(oa, ob, (x, y, z), PairPose(R_a, R_b, (x + ob[0] - oa[0], y + ob[1] - oa[1], z + ob[2] - oa[2])))
+    state = pair_state(A, B, t)
+    x, y, z = state.p
+    return PlacedPair(oa, ob, PairPose(R_a, R_b, (x + ob[0] - oa[0], y + ob[1] - oa[1], z + ob[2] - oa[2])), state)
