@@ -359,7 +359,7 @@ def _store(bodies: Any, i: int, numbers: Any, k: int, flags: int, time: float) -
         bodies.position[i, c] = numbers[k, c]
     bodies.quaternion[i, 0], bodies.quaternion[i, 1] = x, y
     bodies.quaternion[i, 2], bodies.quaternion[i, 3] = z, w
-    bodies.course[i], bodies.rest[i] = STRAIGHT, inf
+    bodies.course[i] = STRAIGHT
     if (flags & (_BODY_TWIST | _STOPS)) != 0:
         _set_course(bodies, i, flags)
     bodies.time[i] = time

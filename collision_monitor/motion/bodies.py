@@ -51,7 +51,7 @@ class BodyTable(NamedTuple):
     angular: Any  # (N, 3)
     acceleration: Any  # (N, 3)
     course: Any  # (N,) uint8: kind of the Course from the last state on
-    rest: Any  # (N,) float64: s after the last state, from which on the body stands; infinite: never
+    rest: Any  # (N,) float64: s after the last state, from which on the body stands; read if the course is not straight
 
 
 DERIVED: Final = ("plain",)

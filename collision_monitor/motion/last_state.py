@@ -148,7 +148,7 @@ def set_reference(bodies: Any, i: int, age: float, time: float, q: Any, k: int, 
 
     q[k] (4,), written: its orientation then.
     """
-    m.course, m.rest, m.time = bodies.course[i], time + (bodies.rest[i] - age), time
+    m.course, m.rest, m.time = bodies.course[i], inf, time
     m.x, m.y, m.z = position_now(bodies, i, age)
     quaternion_now(bodies, i, age, q[k])
     quaternion_to_matrix(q, k, m.rotation)
@@ -157,7 +157,7 @@ def set_reference(bodies: Any, i: int, age: float, time: float, q: Any, k: int, 
         m.wx, m.wy, m.wz = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
         m.ax, m.ay, m.az = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]
         return
-    there = twist_now(bodies, i, age)
+    there, m.rest = twist_now(bodies, i, age), time + (bodies.rest[i] - age)
     m.vx, m.vy, m.vz = there.velocity
     m.wx, m.wy, m.wz = there.angular
     m.ax, m.ay, m.az = scaled(there.velocity, there.change)
