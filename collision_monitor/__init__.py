@@ -42,7 +42,7 @@ _HOME = {
     "ObjectDescription": "objects.description",
     "Model": "records",
     "Pose": "shapes.pose",
-    "Motion": "shapes.pose",
+    "Motion": "motion.stated_motion",
     "load_mesh": "shapes.mesh_file",
     "contact": "query.contact.contact",
     "Contact": "query.contact.contact",
@@ -52,6 +52,8 @@ _HOME = {
     "contacts": "query.contact.contacts",
     "Contacts": "query.contact.contacts",
     "times_of_impact": "query.impact.times_of_impact",
+    "impacts": "query.impact.contact_intervals",
+    "ContactInterval": "query.impact.contact_intervals",
     "contains": "query.points.containment",
     "cast_ray": "query.points.rays",
     "points_within": "query.points.points_within",
@@ -102,6 +104,7 @@ if TYPE_CHECKING:
     from collision_monitor.monitor.monitor import Monitor as Monitor
     from collision_monitor.monitor.result import StepResult as StepResult
     from collision_monitor.monitor.result import StepStatus as StepStatus
+    from collision_monitor.motion.stated_motion import Motion as Motion
     from collision_monitor.objects.convex_decomposition import Decomposition as Decomposition
     from collision_monitor.objects.convex_decomposition import convex_decomposition as convex_decomposition
     from collision_monitor.objects.description import ObjectDescription as ObjectDescription
@@ -113,6 +116,8 @@ if TYPE_CHECKING:
     from collision_monitor.query.contact.distance import distance as distance
     from collision_monitor.query.contact.features_in_contact import contact_features as contact_features
     from collision_monitor.query.contact.overlap import overlap as overlap
+    from collision_monitor.query.impact.contact_intervals import ContactInterval as ContactInterval
+    from collision_monitor.query.impact.contact_intervals import impacts as impacts
     from collision_monitor.query.impact.feature_impact import FeatureImpact as FeatureImpact
     from collision_monitor.query.impact.feature_impact import edge_edge_impact as edge_edge_impact
     from collision_monitor.query.impact.feature_impact import vertex_face_impact as vertex_face_impact
@@ -130,7 +135,6 @@ if TYPE_CHECKING:
     from collision_monitor.records import Model as Model
     from collision_monitor.settings.profile import Profile as Profile
     from collision_monitor.shapes.mesh_file import load_mesh as load_mesh
-    from collision_monitor.shapes.pose import Motion as Motion
     from collision_monitor.shapes.pose import Pose as Pose
     from collision_monitor.shapes.registry import *  # noqa: F403
 

@@ -106,6 +106,8 @@ class StateFlag(IntFlag):
     ACCELERATION_VALID = 2
     DISCONTINUITY = 4
     YAW_ONLY = 8
+    BODY_TWIST = 16
+    STOPS = 32
 
 
 class Phase(IntEnum):

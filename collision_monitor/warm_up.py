@@ -18,10 +18,11 @@ from collision_monitor.alerts.rules import Rules
 from collision_monitor.geometry.point_tree import PointTree
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.time_critical import TimeCritical
+from collision_monitor.motion.stated_motion import Motion
 from collision_monitor.objects.models import containing_model
 from collision_monitor.records import MOST_POINTS, STATE, Model
 from collision_monitor.settings.profile import NO_BUDGET, NO_LIMIT, Profile
-from collision_monitor.shapes.pose import Motion, Pose
+from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Box, ConvexHull, Mesh, Points, Shape, Sphere
 
 Array = NDArray[np.float64]

@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 
 from collision_monitor.accuracy import exact
 from collision_monitor.monitor.monitor import Monitor
+from collision_monitor.motion.stated_motion import Motion
 from collision_monitor.query.contact.contact import contact
 from collision_monitor.query.impact.time_of_impact import time_of_impact
-from collision_monitor.shapes.pose import Motion, Pose
+from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Box, Capsule, Sphere
 
 Rng = np.random.Generator

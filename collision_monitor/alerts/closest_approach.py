@@ -37,11 +37,10 @@ def sphere_approach(scene: MonitoredBodies, i: Slots, j: Slots, horizon: float) 
     """Return a lower bound (n,) of the distance (m) within the horizon (s), by the bounding spheres."""
     p = scene.position[j] - scene.position[i]
     v = scene.velocity[j] - scene.velocity[i]
-    bent = scene.roster.bodies.acceleration
     speed2 = (v**2).sum(axis=1)
     along = -(p * v).sum(axis=1)
     t = np.clip(np.divide(along, speed2, out=np.zeros(len(p)), where=speed2 > 0.0), 0.0, horizon)
-    bend = 0.5 * np.sqrt(((bent[j] - bent[i]) ** 2).sum(axis=1)) * horizon**2
+    bend = 0.5 * scene.relative_acceleration(i, j) * horizon**2
     reach = scene.radius[i] + scene.radius[j] + scene.doubt[i] + scene.doubt[j] + bend
     return np.asarray(np.sqrt(((p + t[:, None] * v) ** 2).sum(axis=1)) - reach)
 
@@ -54,8 +53,7 @@ def closest_approaches(
     enough: m; a pair that is found to stay farther apart is not searched any further, and its DCPA is a lower bound.
     """
     velocity = scene.velocity[j] - scene.velocity[i]
-    bent = scene.roster.bodies.acceleration
-    rate = scene.turning[i] + scene.turning[j] + np.sqrt(((bent[j] - bent[i]) ** 2).sum(axis=1)) * horizon
+    rate = scene.turning[i] + scene.turning[j] + scene.relative_acceleration(i, j) * horizon
     doubt = scene.doubt[i] + scene.doubt[j]
     found, samples = np.empty((2, len(i))), np.empty((3, MOST))
     window = scene.now, horizon

@@ -85,7 +85,7 @@ def _reach(rule: Rule, scene: MonitoredBodies, slots: NDArray[np.intp]) -> Array
                 case "distance":
                     one = np.full(len(slots), 0.5 * max(value, 0.0))
                 case "distance_at_closest_approach":
-                    bent = np.sqrt((scene.roster.bodies.acceleration[slots] ** 2).sum(axis=1))
+                    bent = np.sqrt((scene.acceleration[slots] ** 2).sum(axis=1)) + scene.bending[slots]
                     one = 0.5 * value + speed * horizon + 0.5 * bent * horizon**2
                 case "required_deceleration":
                     one = speed**2 / max(value, 1e-9)  # (a + b)^2 <= 2 a^2 + 2 b^2

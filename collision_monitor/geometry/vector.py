@@ -85,6 +85,12 @@ def sum_of_sizes(v: Vector) -> float:
 
 
 @inlined
+def magnitude(v: Vector) -> float:
+    """Length of v."""
+    return sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+
+
+@inlined
 def direction(v: Vector) -> tuple[float, Vector]:
     """Length and unit vector of v; 0 and +z for a zero vector. Safe from overflow and underflow."""
     x, y, z = v

@@ -10,12 +10,12 @@ from __future__ import annotations
 from math import inf
 from typing import Any, Final, NamedTuple
 
-from collision_monitor._jit import device, kernel
+from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.geometry.vector import Vector
 from collision_monitor.impact.body_impact import ShapePair, Tube, Window, contact_at, shape_impact
 from collision_monitor.impact.impact_record import CLEAR, UNRESOLVED
 from collision_monitor.motion.bodies import next_pair
-from collision_monitor.motion.motion import carry_on
+from collision_monitor.motion.last_state import carry_on
 from collision_monitor.narrow_phase.contact_row import BOUND
 
 SEGMENTS: Final = 8
@@ -82,6 +82,38 @@ def _bound(bodies: Any, spread: Any, i: int) -> float:
     return spread.acceleration[i, 0] + (turning * bodies.spin_radius[i] if turning > 0.0 else 0.0)
 
 
+@inlined
+def _deviation(a_i: float, age_i: float, a_j: float, age_j: float) -> Vector:
+    """Deviation (m) of two bodies from their stated motions, a polynomial in time (s from now).
+
+    a: bounds on their accelerations (m/s^2); age: s since their last states.
+    """
+    return 0.5 * (a_i * age_i * age_i + a_j * age_j * age_j), a_i * age_i + a_j * age_j, 0.5 * (a_i + a_j)
+
+
+@kernel
+def first_possible_impacts(
+    multibody: Any, spread: Any, pairs: Any, now: float, horizon: float, query: Any, work: Any, first: Any
+) -> None:
+    """Write to first (P,) when pairs (P, 2) of body slots may meet at the earliest (s from now), as their bounds allow.
+
+    Infinite: not within the horizon (s), or no bound is declared.
+    """
+    bodies = multibody.bodies
+    for k in range(pairs.shape[0]):
+        i, j = pairs[k, 0], pairs[k, 1]
+        a_i, a_j = _bound(bodies, spread, i), _bound(bodies, spread, j)
+        first[k] = inf
+        if not a_i + a_j > 0.0:
+            continue
+        age_i = carry_on(bodies, i, now, work.quaternion, work.motion[0])
+        age_j = carry_on(bodies, j, now, work.quaternion, work.motion[1])
+        off = _deviation(a_i, age_i, a_j, age_j)
+        found = _first_possible(multibody, i, j, horizon, off, query, work)
+        if found < horizon:
+            first[k] = found
+
+
 @kernel
 def widen_intervals(
     multibody: Any, spread: Any, intervals: Intervals, now: float, horizon: float, query: Any, work: Any
@@ -99,11 +131,7 @@ def widen_intervals(
             continue
         age_i = carry_on(bodies, i, now, work.quaternion, work.motion[0])
         age_j = carry_on(bodies, j, now, work.quaternion, work.motion[1])
-        off = (
-            0.5 * (a_i * age_i * age_i + a_j * age_j * age_j),
-            a_i * age_i + a_j * age_j,
-            0.5 * (a_i + a_j),
-        )
+        off = _deviation(a_i, age_i, a_j, age_j)
         lower[k] = _first_possible(multibody, i, j, lower[k], off, query, work)
         if upper[k] < inf:
             end = max(horizon, upper[k])

@@ -6,8 +6,10 @@ turns at w, it changes by k = m + n x w per second. So the gap along it is at le
     gap + d (n.v + m.p) + d^2 m.v - [h_A(n + d k_A) - h_A(n)] - [h_B(-n - d k_B) - h_B(-n)] - c d^2 / 2
 
 p and v: position and velocity of B's origin relative to A's. A relative acceleration a adds n.a d^2 / 2, which is
-counted only as far as the bound stays concave. h: support values of the cores about those origins. c bounds the
-remainder: |m|^2 |p| and, for each shape, (|w - u|^2 + |w x u|) r, where r is the distance of its farthest point.
+counted only as far as the bound stays concave; it changes by at most a jerk j, which takes j d^3 / 6. h: support values
+of the cores about those origins. c bounds the remainder: |m|^2 |p| and, for each shape, (|w - u|^2 + |w x u|) r, where
+r is the distance of its farthest point. With an angular acceleration, w is that of any time of the step, and |dw/dt| r
+is added.
 With an axis at rest the bound is exact to second order as long as one corner stays the nearest. A face or an edge that
 turns needs an axis that turns with it; otherwise the gap seems to close at |w| r.
 """
@@ -19,6 +21,7 @@ from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.vector import Vector, cross, dot
+from collision_monitor.motion.motion import change_at
 from collision_monitor.narrow_phase.core import rounding
 from collision_monitor.shapes.calls import core_box, core_support, is_centred_box
 from collision_monitor.shapes.kinds.sphere import SPHERE
@@ -39,9 +42,18 @@ class Placed(NamedTuple):
     o_b: Any
     p: Any  # position of b's origin relative to a's
     v: Any
-    acceleration: Any  # of b's origin relative to a's, constant
     w_a: Any
     w_b: Any
+    change: Any  # PairChange
+
+
+@inlined
+def in_motion(pair: Any, placed: Any, t: float, span: float) -> Placed:
+    """A pair of shapes (ShapePair) that is placed at time t (PlacedPair), with how it moves in a span (s) after it."""
+    A, B, a, b = pair
+    oa, ob, pose, state = placed
+    change = change_at(A, B, state, t, span)
+    return Placed(a, b, pose.R_A, pose.R_B, oa, ob, state.p, state.v, state.w_a, state.w_b, change)
 
 
 class Gap(NamedTuple):
@@ -77,11 +89,19 @@ def _seen_from(R: Any, n: Vector, k: Vector) -> Axis:
 
 
 @inlined
-def _bend(table: Any, s: int, w: Vector, u: Vector, offset: Vector) -> float:
-    """Share in c, the bound on the remainder (m/s^2), of a core that turns at w; the axis turns at u."""
+def _bend(table: Any, s: int, w: Vector, turning: Vector, u: Vector, offset: Vector, until: float) -> float:
+    """Share in c, the bound on the remainder (m/s^2), of a core that turns at w; the axis turns at u.
+
+    turning: angular acceleration, constant in the step, which takes until (s).
+    """
     d = (w[0] - u[0], w[1] - u[1], w[2] - u[2])
     c = cross(w, u)
     rate = dot(d, d) + sqrt(dot(c, c))
+    harder = dot(turning, turning)
+    if harder > 0.0:
+        harder = sqrt(harder)
+        faster = sqrt(dot(d, d)) + harder * until
+        rate = faster * faster + sqrt(dot(c, c)) + harder * (1.0 + until * sqrt(dot(u, u)))
     if rate == 0.0:
         return 0.0
     arm = sqrt(dot(offset, offset))
@@ -103,14 +123,17 @@ def advance_along_axis(table: Any, at: Placed, n: Vector, m: Vector, rate: float
     k_a = (m[0] + nw_a[0], m[1] + nw_a[1], m[2] + nw_a[2])
     k_b = (m[0] + nw_b[0], m[1] + nw_b[1], m[2] + nw_b[2])
     rate += dot(n, at.v) + dot(m, at.p) - dot(k_a, at.o_a) + dot(k_b, at.o_b)
-    bend = _bend(table, at.a, at.w_a, u, at.o_a) + _bend(table, at.b, at.w_b, u, at.o_b)
+    acceleration, jerk, turning_a, turning_b = at.change
+    bend = _bend(table, at.a, at.w_a, turning_a, u, at.o_a, until)
+    bend += _bend(table, at.b, at.w_b, turning_b, u, at.o_b, until)
     mm = dot(m, m)
     if mm > 0.0:
-        bent = 0.5 * sqrt(dot(at.acceleration, at.acceleration)) * until * until
+        bent = (0.5 * sqrt(dot(acceleration, acceleration)) + jerk * until / 6.0) * until * until
         last = (at.p[0] + until * at.v[0], at.p[1] + until * at.v[1], at.p[2] + until * at.v[2])
         bend += mm * (sqrt(max(dot(at.p, at.p), dot(last, last))) + bent)
     # n turns while the bodies accelerate: m.a d^3 / 2, bounded by its chord
-    bend += abs(dot(m, at.acceleration)) * until - dot(n, at.acceleration)
+    bend += abs(dot(m, acceleration)) * until - dot(n, acceleration)
+    bend += jerk * until * (1.0 + sqrt(mm) * until) / 3.0
     curvature = max(0.5 * bend - dot(m, at.v), 0.0)
     A, B = _seen_from(at.R_a, n, k_a), _seen_from(at.R_b, n, k_b)
     if is_centred_box(table.kind[at.a]) and is_centred_box(table.kind[at.b]):

@@ -9,8 +9,9 @@ from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.impact.body_impact import CLOSING, closing_speed
 from collision_monitor.impact.mesh_pair import SURFACES, shapes_overlap, shapes_within
 from collision_monitor.motion.bodies import next_pair, place_shape
-from collision_monitor.motion.motion import (
+from collision_monitor.motion.last_state import (
     age_of,
+    angular_now,
     position_now,
     relative_position_now,
     relative_velocity_now,
@@ -53,17 +54,8 @@ class Now(NamedTuple):
 def relative_now(bodies: Any, i: int, j: int, time: float) -> Now:
     """Compute body j relative to body i at `time` (s)."""
     age_i, age_j = age_of(bodies, i, time), age_of(bodies, j, time)
-    p = (
-        relative_position_now(bodies, i, age_i, j, age_j, 0),
-        relative_position_now(bodies, i, age_i, j, age_j, 1),
-        relative_position_now(bodies, i, age_i, j, age_j, 2),
-    )
-    v = (
-        relative_velocity_now(bodies, i, age_i, j, age_j, 0),
-        relative_velocity_now(bodies, i, age_i, j, age_j, 1),
-        relative_velocity_now(bodies, i, age_i, j, age_j, 2),
-    )
-    return Now(p, v, age_i, age_j)
+    p = relative_position_now(bodies, i, age_i, j, age_j)
+    return Now(p, relative_velocity_now(bodies, i, age_i, j, age_j), age_i, age_j)
 
 
 @inlined
@@ -75,18 +67,18 @@ def widening(now: Now, stale_acceleration: float) -> float:
 @inlined
 def closing_now(bodies: Any, i: int, j: int, now: Now, row: Any) -> float:
     """Speed (m/s) at which the witness points of a contact row about body i approach."""
-    wa = (bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2])
-    wb = (bodies.angular[j, 0], bodies.angular[j, 1], bodies.angular[j, 2])
-    return closing_speed(now.v, wa, wb, now.p, row)
+    return closing_speed(
+        now.v, angular_now(bodies, i, now.age_i), angular_now(bodies, j, now.age_j), now.p, row
+    )  # fmt: skip
 
 
 @inlined
 def move_to_world(bodies: Any, i: int, now: Now, row: Any) -> None:
     """Move the witness points of a contact row about body i to the world's origin."""
+    at = position_now(bodies, i, now.age_i)
     for c in range(3):
-        at = position_now(bodies, i, now.age_i, c)
-        row[POINT_A + c] += at
-        row[POINT_B + c] += at
+        row[POINT_A + c] += at[c]
+        row[POINT_B + c] += at[c]
 
 
 @device
@@ -188,8 +180,9 @@ def bounded_contact(bodies: Any, i: int, j: int, now: Now, reach: float, result:
     if distance > 0.0:
         for c in range(3):
             result[NORMAL + c] = now.p[c] / distance
+    at = position_now(bodies, i, now.age_i)
     for c in range(3):
-        result[POINT_A + c] = position_now(bodies, i, now.age_i, c)
+        result[POINT_A + c] = at[c]
         result[POINT_B + c] = result[POINT_A + c] + now.p[c]
     result[BOUND] = reach
     for c in range(3):

@@ -1,4 +1,4 @@
-"""Time of impact of two bodies at constant twist, as an interval whose lower end is safe.
+"""Time of impact of two bodies on their courses, as an interval whose lower end is safe.
 
 Conservative advancement along a separating axis (Mirtich 1996). It follows the rotation to first order (advance.py) and
 therefore converges quadratically, while a bound by |w| r converges linearly.
@@ -15,7 +15,7 @@ import numpy as np
 from collision_monitor._jit import device, inlined, outlined
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.geometry.vector import Vector
-from collision_monitor.impact.advance import Placed, advance_along_axis
+from collision_monitor.impact.advance import advance_along_axis, in_motion
 from collision_monitor.impact.impact_record import (
     CLEAR,
     CLOSED_FORM,
@@ -30,11 +30,15 @@ from collision_monitor.impact.overlap_time import overlap_time
 from collision_monitor.impact.sphere_interval import meeting_of_spheres, relative_motion_at, sphere_interval
 from collision_monitor.impact.tree_impact import FULL
 from collision_monitor.meshes.distance.nearest import MEMORY, PLACE_A, PLACE_B, answer_row
-from collision_monitor.motion.bodies import next_pair, place_shape
-from collision_monitor.motion.motion import half_acceleration, relative_position, relative_velocity, rotation_at
+from collision_monitor.motion.bodies import next_pair
+from collision_monitor.motion.motion import (
+    half_acceleration,
+    position_at,
+    smooth_until,
+)
+from collision_monitor.motion.placed_pair import place_pair
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.dispatch import separation
-from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.narrow_phase.work_memory import WORK_SIZE
 from collision_monitor.tolerances import EPSILON
 
@@ -140,23 +144,15 @@ def shape_impact(
     if has_mesh(table, a, b):
         return mesh_impact(table, parts, pair, window, tube, query, FULL, scratch)
     begin, end = window
-    R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
-    acceleration = (B.ax - A.ax, B.ay - A.ay, B.az - A.az)
-    w_a, w_b = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
     n_before = AT_REST
     t = t_before = begin
     gap_before = inf
     status, iteration, guess = UNRESOLVED, 0, 0.0
     while iteration < query.iterations:
         iteration += 1
-        rotation_at(A, t, R_i)
-        rotation_at(B, t, R_j)
-        oa = place_shape(table, parts, a, R_i, R_a)
-        ob = place_shape(table, parts, b, R_j, R_b)
-        px, py, pz = relative_position(A, B, t)
-        pose = PairPose(R_a, R_b, (px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2]))
-        gap = separation(table, a, b, pose, out, scratch.work)
+        placed = place_pair(table, parts, pair, t, scratch)
+        gap = separation(table, a, b, placed.pose, out, scratch.work)
         gap -= query.margin + tube.start + tube.growth * (t - begin)
         if gap <= query.tolerance:
             if t > t_before:
@@ -164,22 +160,26 @@ def shape_impact(
                 guess = wanted * (t - t_before) / (gap_before - gap)
             status = HIT
             break
-        n, v = (out[0], out[1], out[2]), relative_velocity(A, B, t)
-        at = Placed(a, b, R_a, R_b, oa, ob, (px, py, pz), v, acceleration, w_a, w_b)
+        n, border = (out[0], out[1], out[2]), min(end, smooth_until(A, B, t))
+        at = in_motion(pair, placed, t, border - t)
         # aim at half the tolerance, so that the last advance ends inside it
         aim = gap - 0.5 * query.tolerance
-        d, m, until = 0.0, AT_REST, end - t
+        d, m, until = 0.0, AT_REST, border - t
         for turns in range(2):
             d = max(d, advance_along_axis(table, at, n, m, -tube.growth, aim, until))
-            if turns or t == t_before or d >= until:
+            if turns or (t == t_before and at.change.jerk == 0.0) or d >= until:
                 break
-            m = _turning(n_before, n, t - t_before)
-            if m[0] == 0.0 and m[1] == 0.0 and m[2] == 0.0:
+            if t > t_before:
+                m = _turning(n_before, n, t - t_before)
+            if m[0] == 0.0 and m[1] == 0.0 and m[2] == 0.0 and at.change.jerk == 0.0:
                 break
             until = min(until, FARTHER * d)
         t_before, gap_before, n_before = t, gap, n
-        if d >= end - t:
-            return CLEAR, end, iteration, guess
+        if d >= border - t:
+            if border == end:
+                return CLEAR, end, iteration, guess
+            t = border  # where a body comes to rest
+            continue
         if t + d <= t:  # the time has no finer resolution
             break
         t += d
@@ -198,15 +198,8 @@ def contact_at(table: Any, parts: Any, pair: ShapePair, t: float, scratch: Scrat
 @outlined
 def _contact_at(table: Any, parts: Any, pair: ShapePair, t: float, places: Any, scratch: Scratch) -> float:
     """`contact_at`, or if there are places of two triangles (mesh_pair.py), the contact of these."""
-    A, B, a, b = pair
-    R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
-    out = scratch.out
-    rotation_at(A, t, R_i)
-    rotation_at(B, t, R_j)
-    oa = place_shape(table, parts, a, R_i, R_a)
-    ob = place_shape(table, parts, b, R_j, R_b)
-    p = relative_position(A, B, t)
-    pose = PairPose(R_a, R_b, (p[0] + ob[0] - oa[0], p[1] + ob[1] - oa[1], p[2] + ob[2] - oa[2]))
+    a, b, out = pair.a, pair.b, scratch.out
+    oa, _, pose, state = place_pair(table, parts, pair, t, scratch)
     if places[0] >= 0:
         triangles_contact(table, a, b, pose, places, out)
     else:
@@ -214,8 +207,7 @@ def _contact_at(table: Any, parts: Any, pair: ShapePair, t: float, places: Any, 
     for k in range(3):
         out[POINT_A + k] += oa[k]
         out[POINT_B + k] += oa[k]
-    v = relative_velocity(A, B, t)
-    out[CLOSING] = closing_speed(v, (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz), p, out)
+    out[CLOSING] = closing_speed(state.v, state.w_a, state.w_b, state.p, out)
     return out[DISTANCE]
 
 
@@ -346,7 +338,7 @@ def chains_impact(
     event.status = CLEAR
     tube = tube_of(A, B, begin)
     approach = relative_motion_at(A, B, begin)
-    bent = half_acceleration(A, B) * (end - begin)  # m/s: the path deviates from its tangent by less
+    bent = half_acceleration(A, B, begin, end) * (end - begin)  # m/s: the path deviates from its tangent by less
     # every impact lies in the time in which the bounding spheres overlap
     first, last = 0.0, end - begin
     reach = A.radius + B.radius + query.margin
@@ -388,10 +380,10 @@ def chains_impact(
 @inlined
 def _set_geometry(event: Any, A: Any, t: float, out: Any) -> None:
     """Set point, normal and closing speed of the impact from a contact at time t about A's origin."""
-    ta = t - A.time
-    event.point_x = A.x + (A.vx + 0.5 * A.ax * ta) * ta + 0.5 * (out[POINT_A] + out[POINT_B])
-    event.point_y = A.y + (A.vy + 0.5 * A.ay * ta) * ta + 0.5 * (out[POINT_A + 1] + out[POINT_B + 1])
-    event.point_z = A.z + (A.vz + 0.5 * A.az * ta) * ta + 0.5 * (out[POINT_A + 2] + out[POINT_B + 2])
+    x, y, z = position_at(A, t)
+    event.point_x = x + 0.5 * (out[POINT_A] + out[POINT_B])
+    event.point_y = y + 0.5 * (out[POINT_A + 1] + out[POINT_B + 1])
+    event.point_z = z + 0.5 * (out[POINT_A + 2] + out[POINT_B + 2])
     event.normal_x, event.normal_y, event.normal_z = out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]
     event.closing_speed = out[CLOSING]
 

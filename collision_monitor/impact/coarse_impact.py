@@ -32,7 +32,12 @@ from collision_monitor.impact.pair_impacts import PREFETCH_AHEAD, window_of
 from collision_monitor.impact.sphere_interval import meeting_of_spheres, relative_motion_at, sphere_interval
 from collision_monitor.impact.tree_impact import SearchEnd, tree_approach_at
 from collision_monitor.motion.bodies import place_shape
-from collision_monitor.motion.motion import half_acceleration, relative_position, relative_velocity
+from collision_monitor.motion.motion import (
+    half_acceleration,
+    pair_state,
+    position_at,
+    relative_velocity,
+)
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.shapes.kinds.half_space import HALF_SPACE
@@ -45,14 +50,14 @@ TRIES: Final = (1.5, 4.0)
 def _write_hit(pair: ShapePair, t: float, event: Any, out: Any) -> None:
     """Set what a certain collision at time t (s) has, from the contact of two triangles about A's origin."""
     A, B = pair.A, pair.B
-    ta = t - A.time
+    x, y, z = position_at(A, t)
     event.upper, event.status, event.method = t, HIT, CONSERVATIVE_ADVANCEMENT
-    event.point_x = A.x + (A.vx + 0.5 * A.ax * ta) * ta + 0.5 * (out[POINT_A] + out[POINT_B])
-    event.point_y = A.y + (A.vy + 0.5 * A.ay * ta) * ta + 0.5 * (out[POINT_A + 1] + out[POINT_B + 1])
-    event.point_z = A.z + (A.vz + 0.5 * A.az * ta) * ta + 0.5 * (out[POINT_A + 2] + out[POINT_B + 2])
+    event.point_x = x + 0.5 * (out[POINT_A] + out[POINT_B])
+    event.point_y = y + 0.5 * (out[POINT_A + 1] + out[POINT_B + 1])
+    event.point_z = z + 0.5 * (out[POINT_A + 2] + out[POINT_B + 2])
     event.normal_x, event.normal_y, event.normal_z = out[NORMAL], out[NORMAL + 1], out[NORMAL + 2]
-    v, p = relative_velocity(A, B, t), relative_position(A, B, t)
-    event.closing_speed = closing_speed(v, (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz), p, out)
+    state = pair_state(A, B, t)
+    event.closing_speed = closing_speed(state.v, state.w_a, state.w_b, state.p, out)
 
 
 @device
@@ -75,7 +80,7 @@ def _together(A: Any, B: Any, window: Window, margin: float) -> tuple[float, flo
     """First and last time (s) after the begin of a window at which the bounding spheres of two motions may overlap."""
     begin, end = window
     tube, approach = tube_of(A, B, begin), relative_motion_at(A, B, begin)
-    growth = tube.growth + half_acceleration(A, B) * (end - begin)
+    growth = tube.growth + half_acceleration(A, B, begin, end) * (end - begin)
     return sphere_interval(approach.p, approach.v, A.radius + B.radius + margin + tube.start, growth, end - begin, 1.0)
 
 

@@ -78,7 +78,7 @@ def bound_impact(bodies: Any, i: int, j: int, window: Window, margin: float, eve
     event.status = CLEAR
     tube = tube_of(A, B, begin)
     approach = relative_motion_at(A, B, begin)
-    bent = half_acceleration(A, B) * (end - begin)
+    bent = half_acceleration(A, B, begin, end) * (end - begin)
     reach = A.radius + B.radius + margin + tube.start
     first, last = sphere_interval(approach.p, approach.v, reach, tube.growth + bent, end - begin, 1.0)
     if first > last:

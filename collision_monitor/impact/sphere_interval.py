@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.vector import Vector
-from collision_monitor.motion.motion import half_acceleration, relative_position, relative_velocity
+from collision_monitor.motion.motion import half_acceleration, position_at, relative_position, relative_velocity
 from collision_monitor.tolerances import EPSILON
 
 _SMALLEST: Final = 1e-240
@@ -102,7 +102,7 @@ def meeting_of_spheres(A: Any, B: Any, approach: RelativeMotion, begin: float, t
     p, v = approach
     dx, dy, dz = (
         relative_position(A, B, begin + t)
-        if half_acceleration(A, B) > 0.0
+        if half_acceleration(A, B, begin, begin + t) > 0.0
         else (p[0] + v[0] * t, p[1] + v[1] * t, p[2] + v[2] * t)
     )
     length = sqrt(dx * dx + dy * dy + dz * dz)
@@ -110,11 +110,9 @@ def meeting_of_spheres(A: Any, B: Any, approach: RelativeMotion, begin: float, t
         nx, ny, nz = dx / length, dy / length, dz / length
     else:
         nx, ny, nz = 0.0, 0.0, 1.0
-    ta = begin + t - A.time
+    x, y, z = position_at(A, begin + t)
     share = A.radius / (A.radius + B.radius) * length
-    event.point_x = A.x + (A.vx + 0.5 * A.ax * ta) * ta + share * nx
-    event.point_y = A.y + (A.vy + 0.5 * A.ay * ta) * ta + share * ny
-    event.point_z = A.z + (A.vz + 0.5 * A.az * ta) * ta + share * nz
+    event.point_x, event.point_y, event.point_z = x + share * nx, y + share * ny, z + share * nz
     event.normal_x, event.normal_y, event.normal_z = nx, ny, nz
     vx, vy, vz = relative_velocity(A, B, begin + t)
     event.closing_speed = -(vx * nx + vy * ny + vz * nz)

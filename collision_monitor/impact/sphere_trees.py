@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
+from collision_monitor.geometry.vector import Vector, cross
 from collision_monitor.impact.body_impact import Window, tube_of
 from collision_monitor.impact.impact_record import CLEAR, TREE_BOUND
 from collision_monitor.impact.sphere_interval import meeting_of_spheres, relative_motion_at, sphere_interval
-from collision_monitor.motion.motion import half_acceleration, rotation_at
+from collision_monitor.motion.motion import change_at, half_acceleration, most_turning, pair_state, rotation_at
 from collision_monitor.shapes.kinds.box import BOX
 from collision_monitor.shapes.kinds.convex_hull import CONVEX_HULL
 from collision_monitor.tolerances import ROUNDED_UP
@@ -134,13 +135,15 @@ class _Ball(NamedTuple):
 
 
 @inlined
-def _ball(trees: Trees, at: int, m: Any, R: Any, rate: float, span: float) -> _Ball:
-    """Sphere `at` of a body in motion m (MOTION) with rotation R, which turns at `rate` (rad/s) for `span` (s).
+def _ball(trees: Trees, at: int, m: Any, R: Any, w: Vector, turning: Any, span: float) -> _Ball:
+    """Sphere `at` of a body in motion m (MOTION) with rotation R, which turns at w (rad/s) for `span` (s).
 
-    at = -1: the body's bounding sphere.
+    turning: largest angular speed in the span (rad/s), and angular acceleration (rad/s^2). at = -1: the body's bounding
+    sphere.
     """
     if at < 0:
         return _Ball((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), m.radius, 0.0)
+    rate, harder = turning
     cx, cy, cz = trees.center[at, 0], trees.center[at, 1], trees.center[at, 2]
     x = R[0, 0] * cx + R[0, 1] * cy + R[0, 2] * cz
     y = R[1, 0] * cx + R[1, 1] * cy + R[1, 2] * cz
@@ -150,8 +153,15 @@ def _ball(trees: Trees, at: int, m: Any, R: Any, rate: float, span: float) -> _B
         return _Ball((x, y, z), (0.0, 0.0, 0.0), trees.radius[at], growth)
     # it leaves its tangent by (rate t)^2 / 2 of the lever; its chord over the span is
     growth *= 0.5 * rate * span
-    v = (m.wy * z - m.wz * y, m.wz * x - m.wx * z, m.wx * y - m.wy * x)
-    return _Ball((x, y, z), v, trees.radius[at], growth)
+    if harder > 0.0:
+        growth += 0.5 * harder * span * sqrt(cx * cx + cy * cy + cz * cz)
+    return _Ball((x, y, z), cross(w, (x, y, z)), trees.radius[at], growth)
+
+
+@inlined
+def _turning(m: Any, begin: float, end: float, harder: Vector) -> tuple[float, float]:
+    """Largest angular speed of a motion in a span (rad/s), and the magnitude of its angular acceleration (rad/s^2)."""
+    return most_turning(m, begin, end), sqrt(harder[0] * harder[0] + harder[1] * harder[1] + harder[2] * harder[2])
 
 
 @device
@@ -166,7 +176,7 @@ def tree_meeting(bodies: Any, trees: Trees, i: int, j: int, window: Window, marg
     begin, end = window
     tube = tube_of(A, B, begin)
     p, v = relative_motion_at(A, B, begin)
-    growth = tube.growth + half_acceleration(A, B) * (end - begin)  # bounds the deviation from the tangent
+    growth = tube.growth + half_acceleration(A, B, begin, end) * (end - begin)  # bounds the deviation from the tangent
     reach = A.radius + B.radius + margin + tube.start
     soonest, last = sphere_interval(p, v, reach, growth, end - begin, 1.0)
     if soonest > last:
@@ -176,15 +186,18 @@ def tree_meeting(bodies: Any, trees: Trees, i: int, j: int, window: Window, marg
     rotation_at(A, begin + soonest, R_i)
     rotation_at(B, begin + soonest, R_j)
     wide = (margin + (tube.start + growth * soonest)) * (1.0 + 1e-12)
-    rate_a = sqrt(A.wx * A.wx + A.wy * A.wy + A.wz * A.wz)
-    rate_b = sqrt(B.wx * B.wx + B.wy * B.wy + B.wz * B.wz)
+    start = begin + soonest
+    state = pair_state(A, B, start)
+    change = change_at(A, B, state, start, span)
+    turning_a, turning_b = _turning(A, start, end, change.turning_a), _turning(B, start, end, change.turning_b)
     stack = trees.stack
     stack[0, 0], stack[0, 1] = trees.root[i], trees.root[j]
     waiting, best = 1, inf
     while waiting > 0:  # terminates: each pair of spheres is removed once, and adds two with the halves of one
         waiting -= 1
         a, b = stack[waiting, 0], stack[waiting, 1]
-        ball_a, ball_b = _ball(trees, a, A, R_i, rate_a, span), _ball(trees, b, B, R_j, rate_b, span)
+        ball_a = _ball(trees, a, A, R_i, state.w_a, turning_a, span)
+        ball_b = _ball(trees, b, B, R_j, state.w_b, turning_b, span)
         d = (px + (ball_b.p[0] - ball_a.p[0]), py + (ball_b.p[1] - ball_a.p[1]), pz + (ball_b.p[2] - ball_a.p[2]))
         u = (
             v[0] + (ball_b.v[0] - ball_a.v[0]),

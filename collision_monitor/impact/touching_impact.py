@@ -12,10 +12,10 @@ from typing import Any, Final
 
 from collision_monitor._jit import inlined, outlined
 from collision_monitor.geometry.vector import Vector, cross, dot, minus, opposite, rotate_back
-from collision_monitor.impact.advance import Placed, advance_along_axis
+from collision_monitor.impact.advance import Placed, advance_along_axis, in_motion
 from collision_monitor.impact.body_impact import AT_REST
-from collision_monitor.motion.bodies import place_shape
-from collision_monitor.motion.motion import relative_position, relative_velocity, rotation_at
+from collision_monitor.motion.motion import PairChange, smooth_until
+from collision_monitor.motion.placed_pair import place_pair
 from collision_monitor.narrow_phase.contact_row import NORMAL
 from collision_monitor.narrow_phase.core import rounding
 from collision_monitor.narrow_phase.dispatch import pair_contact
@@ -40,8 +40,9 @@ Larger: the change comes near GJK_TOUCHING. Smaller: a wheel whose axis is round
 
 
 @inlined
-def _gap_along(table: Any, a: int, b: int, R_a: Any, R_b: Any, between: Vector, n: Vector) -> float:
+def _gap_along(table: Any, a: int, b: int, pose: PairPose, n: Vector) -> float:
     """Gap (m) of two shapes along n, from their support functions; negative if they overlap along it."""
+    R_a, R_b, between = pose
     if table.kind[b] == HALF_SPACE:
         own = rotate_back(R_b, opposite(n))
         normal = table.size[b, 0], table.size[b, 1], table.size[b, 2]
@@ -74,6 +75,18 @@ def _turning(table: Any, s: int, R: Any, o: Vector, w: Vector, n: Vector) -> Vec
     return w
 
 
+@inlined
+def _rolling(table: Any, at: Placed, n: Vector) -> Placed:
+    """The shapes without rotations that leave their reach along n as it is, see `_turning`."""
+    w_a = _turning(table, at.a, at.R_a, at.o_a, at.w_a, n)
+    w_b = _turning(table, at.b, at.R_b, at.o_b, at.w_b, n)
+    acceleration, jerk, harder_a, harder_b = at.change
+    harder_a = harder_a if dot(w_a, w_a) > 0.0 else AT_REST
+    harder_b = harder_b if dot(w_b, w_b) > 0.0 else AT_REST
+    change = PairChange(acceleration, jerk, harder_a, harder_b)
+    return Placed(at.a, at.b, at.R_a, at.R_b, at.o_a, at.o_b, at.p, at.v, w_a, w_b, change)
+
+
 @outlined
 def touching_impact(
     table: Any, parts: Any, pair: Any, window: Any, skin: float, apart: float, separation: float, scratch: Any
@@ -85,47 +98,37 @@ def touching_impact(
     """
     A, B, a, b = pair
     begin, end = window
-    R_i, R_j, R_a, R_b = scratch.rotation[0], scratch.rotation[1], scratch.rotation[2], scratch.rotation[3]
     out = scratch.out
-    acceleration = (B.ax - A.ax, B.ay - A.ay, B.az - A.az)
-    w_a, w_b = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
     t = before = begin
     n, is_new = AT_REST, True
     for _ in range(STEPS):
-        rotation_at(A, t, R_i)
-        rotation_at(B, t, R_j)
-        oa, ob = place_shape(table, parts, a, R_i, R_a), place_shape(table, parts, b, R_j, R_b)
-        px, py, pz = relative_position(A, B, t)
-        between = (px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2])
-        gap = 0.0 if is_new else _gap_along(table, a, b, R_a, R_b, between, n) - separation
+        placed = place_pair(table, parts, pair, t, scratch)
+        gap = 0.0 if is_new else _gap_along(table, a, b, placed.pose, n) - separation
         if is_new or gap < -0.5 * skin:
-            pair_contact(table, a, b, PairPose(R_a, R_b, between), out, scratch.work)
+            pair_contact(table, a, b, placed.pose, out, scratch.work)
             n = (out[NORMAL], out[NORMAL + 1], out[NORMAL + 2])
-            gap, is_new = _gap_along(table, a, b, R_a, R_b, between, n) - separation, False
+            gap, is_new = _gap_along(table, a, b, placed.pose, n) - separation, False
             if gap < -0.5 * skin:
                 return DEEPENS, before
         if gap > apart:
             return PARTS, t
-        at = Placed(
-            a, b, R_a, R_b, oa, ob, (px, py, pz), relative_velocity(A, B, t), acceleration,
-            _turning(table, a, R_a, oa, w_a, n), _turning(table, b, R_b, ob, w_b, n),
-        )  # fmt: skip
-        d = advance_along_axis(table, at, n, AT_REST, 0.0, gap + skin, end - t)
+        border = min(end, smooth_until(A, B, t))
+        at = _rolling(table, in_motion(pair, placed, t, border - t), n)
+        d = advance_along_axis(table, at, n, AT_REST, 0.0, gap + skin, border - t)
         share = 1.0
         for _halving in range(HALVINGS):  # the latest time of these at which they are apart along the direction
             later = t + share * d
             if later <= t:
                 break
-            rotation_at(A, later, R_i)
-            rotation_at(B, later, R_j)
-            oa, ob = place_shape(table, parts, a, R_i, R_a), place_shape(table, parts, b, R_j, R_b)
-            px, py, pz = relative_position(A, B, later)
-            between = (px + ob[0] - oa[0], py + ob[1] - oa[1], pz + ob[2] - oa[2])
-            if _gap_along(table, a, b, R_a, R_b, between, n) - separation > apart:
+            then = place_pair(table, parts, pair, later, scratch)
+            if _gap_along(table, a, b, then.pose, n) - separation > apart:
                 return PARTS, later
             share *= 0.5
-        if d >= end - t:
-            return RESTS, end
+        if d >= border - t:
+            if border == end:
+                return RESTS, end
+            before, t = t, border
+            continue
         if t + d <= t:
             return DEEPENS, before
         before = t

@@ -13,7 +13,7 @@ from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined, outlined
-from collision_monitor.geometry.vector import cross, dot, minus, plus, rotate_back
+from collision_monitor.geometry.vector import cross, dot, magnitude, minus, plus, rotate_back
 from collision_monitor.impact.impact_record import CLEAR, HIT, UNRESOLVED
 from collision_monitor.meshes.advance.approach import Approach, seen_from_b
 from collision_monitor.meshes.advance.box_times import box_times
@@ -22,8 +22,14 @@ from collision_monitor.meshes.distance.contact import reach_in
 from collision_monitor.meshes.distance.nearest import BOUNDS, MOST_PAIRS, PAIRS, PLACE_A, PLACE_B, opens_b, size_of
 from collision_monitor.meshes.layout import CENTER, CHILD, HALF, WIDTH
 from collision_monitor.meshes.placing import inverse, place_point, relative
-from collision_monitor.motion.bodies import place_shape
-from collision_monitor.motion.motion import relative_position, relative_velocity, rotation_at
+from collision_monitor.motion.motion import (
+    are_straight,
+    change_at,
+    half_acceleration,
+    most_turning,
+    smooth_until,
+)
+from collision_monitor.motion.placed_pair import place_pair
 from collision_monitor.shapes.shape_table import TREE
 from collision_monitor.tolerances import EPSILON
 
@@ -57,6 +63,9 @@ HEAP: Final = 2 * MOST_PAIRS // ENTRY
 
 LEAST_DURATION: Final = 1e-300
 """s: least duration of a search."""
+
+UNBOUNDED: Final = 1e300
+"""m/s^3: in place of a bound on the jerk of motions that come to rest or change how fast they turn."""
 
 KEEP_EARLY: Final = 1.0
 """KEEP of a search that ends early, whose steps are long."""
@@ -160,19 +169,23 @@ def tree_approach_at(
     contact (m). until: time at which the search ends (s).
     """
     A, B, a, b = pair
-    R_a, R_b = scratch.rotation[2], scratch.rotation[3]
-    rotation_at(A, t, scratch.rotation[0])
-    rotation_at(B, t, scratch.rotation[1])
-    o_a = place_shape(table, parts, a, scratch.rotation[0], R_a)
-    o_b = place_shape(table, parts, b, scratch.rotation[1], R_b)
-    w_a, w_b = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
-    p, v = relative_position(A, B, t), relative_velocity(A, B, t)
+    R_a = scratch.rotation[2]
+    o_a, o_b, _, state = place_pair(table, parts, pair, t, scratch)
+    p, v, w_a, w_b, _, _ = state
     # the shapes' origins turn about those of their bodies
     turn_a, turn_b = cross(w_a, o_a), cross(w_b, o_b)
-    own = B.ax - A.ax, B.ay - A.ay, B.az - A.az
+    change = change_at(A, B, state, t, until - t)
+    own, jerk = change.acceleration, change.jerk
     bend_a, bend_b = dot(w_a, w_a), dot(w_b, w_b)
     jerk_a, jerk_b = bend_a * sqrt(bend_a), bend_b * sqrt(bend_b)
     arm_a, arm_b = sqrt(dot(o_a, o_a)), sqrt(dot(o_b, o_b))
+    bend = sqrt(dot(own, own))
+    if not are_straight(A, B):
+        bend = 2.0 * half_acceleration(A, B, t, until)
+        harder_a, harder_b = magnitude(change.turning_a), magnitude(change.turning_b)
+        bend_a, bend_b = most_turning(A, t, until) ** 2 + harder_a, most_turning(B, t, until) ** 2 + harder_b
+        if harder_a + harder_b > 0.0 or smooth_until(A, B, t) < until:
+            jerk = UNBOUNDED  # the largest acceleration of any time bounds the gaps alone
     return minus(plus(p, o_b), o_a), Approach(
         rotate_back(R_a, minus(plus(v, turn_b), turn_a)),
         rotate_back(R_a, minus(plus(own, cross(w_b, turn_b)), cross(w_a, turn_a))),
@@ -180,10 +193,10 @@ def tree_approach_at(
         rotate_back(R_a, w_b),
         bend_a,
         bend_b,
-        sqrt(dot(own, own)) + bend_a * arm_a + bend_b * arm_b,
+        bend + bend_a * arm_a + bend_b * arm_b,
         jerk_a,
         jerk_b,
-        jerk_a * arm_a + jerk_b * arm_b,
+        jerk + jerk_a * arm_a + jerk_b * arm_b,
         margin + table.margin[a] + table.margin[b],
         growth,
         until - t,

@@ -11,6 +11,8 @@ from math import sqrt
 from typing import Any, Final
 
 from collision_monitor._jit import device, inlined
+from collision_monitor.motion.course import STRAIGHT
+from collision_monitor.motion.motion import position_at, twist_at
 
 NARROWEST: Final = 2.0**-26
 ONCE: Final = 2.0**-25
@@ -99,6 +101,9 @@ def fit_width(bodies: Any, i: int, now: float, limits: tuple[float, bool], setti
     apart = drift = off = 0.0
     p = (m.x + m.vx * since, m.y + m.vy * since, m.z + m.vz * since)
     v, w_m = (m.vx, m.vy, m.vz), (m.wx, m.wy, m.wz)
+    if m.course != STRAIGHT:
+        p, there = position_at(m, now), twist_at(m, now)
+        v, w_m = there.velocity, there.angular
     for c in range(3):
         apart += (bodies.position[i, c] - p[c]) ** 2
         drift += (bodies.linear[i, c] - v[c]) ** 2

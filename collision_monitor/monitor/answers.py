@@ -25,7 +25,7 @@ from collision_monitor.monitor.result import Refused, StepResult, StepStatus
 from collision_monitor.monitor.state.roster import count_bodies
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
-from collision_monitor.motion.motion import age_of
+from collision_monitor.motion.last_state import age_of
 from collision_monitor.narrow_phase.contact_row import (
     BOUND,
     DISTANCE,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.motion.bodies import BodyTable
+from collision_monitor.motion.extrapolated import extrapolated
 from collision_monitor.records import Method
 from collision_monitor.settings.setting import EVERYWHERE, Vector
 
@@ -26,11 +27,9 @@ def bodies_in(
     A stale object widens its bounds here: the radius of its sphere grows by what it may have moved off its predicted
     path since its last state, at stale_acceleration (m/s^2).
     """
-    age = np.where(bodies.static[:top], 0.0, now - bodies.time[:top])
-    centre = bodies.position[:top] + bodies.linear[:top] * age[:, None]
-    centre += 0.5 * bodies.acceleration[:top] * age[:, None] ** 2
-    outside = np.maximum(np.maximum(np.asarray(low) - centre, centre - np.asarray(high)), 0.0)
-    reach = bodies.motion["radius"][:top] + 0.5 * stale_acceleration * age**2
+    there = extrapolated(bodies, np.arange(top), now)
+    outside = np.maximum(np.maximum(np.asarray(low) - there.position, there.position - np.asarray(high)), 0.0)
+    reach = bodies.motion["radius"][:top] + 0.5 * stale_acceleration * there.age**2
     return np.asarray((outside**2).sum(axis=1) <= reach**2)
 
 
@@ -41,10 +40,5 @@ def closes_fast(predictions: NDArray[np.void], least: float) -> NDArray[np.bool_
 
 def approaches(bodies: BodyTable, i: NDArray[np.int32], j: NDArray[np.int32], now: float) -> NDArray[np.bool_]:
     """Mask of the pairs of bodies i and j (n,) whose origins approach each other, or keep their distance, at `now`."""
-    position, velocity = np.zeros((len(i), 3)), np.zeros((len(i), 3))
-    for slots, sign in ((i, -1.0), (j, 1.0)):
-        age = np.where(bodies.static[slots], 0.0, now - bodies.time[slots])
-        change = bodies.acceleration[slots] * age[:, None]
-        position += sign * (bodies.position[slots] + (bodies.linear[slots] + 0.5 * change) * age[:, None])
-        velocity += sign * (bodies.linear[slots] + change)
-    return np.asarray((position * velocity).sum(axis=1) <= 0.0)
+    a, b = extrapolated(bodies, i, now), extrapolated(bodies, j, now)
+    return np.asarray(((b.position - a.position) * (b.velocity - a.velocity)).sum(axis=1) <= 0.0)

@@ -13,11 +13,14 @@ from collision_monitor._jit import device, inlined, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor.checks.numbers import as_numbers, hides_some
 from collision_monitor.errors import InputError, Refusal
+from collision_monitor.geometry.vector import Vector, cross, dot, magnitude
 from collision_monitor.monitor.refusals import Refusals, some_ids
 from collision_monitor.monitor.state.roster import Roster
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.state.timeline import NANOSECOND, Order, Progress, Timeline
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
+from collision_monitor.motion.course import ARC, STRAIGHT, course_of, place_on
+from collision_monitor.motion.trigonometry import sin_cos
 from collision_monitor.records import StateFlag
 from collision_monitor.settings.by_name import classes_of
 from collision_monitor.settings.profile import Profile
@@ -48,6 +51,8 @@ _ORIENTATION_STDDEV: Final = 17
 _TWIST_UNKNOWN: Final = int(StateFlag.TWIST_UNKNOWN)
 _DISCONTINUITY: Final = int(StateFlag.DISCONTINUITY)
 _ACCELERATION_VALID: Final = int(StateFlag.ACCELERATION_VALID)
+_BODY_TWIST: Final = int(StateFlag.BODY_TWIST)
+_STOPS: Final = int(StateFlag.STOPS)
 
 _VERDICTS: Final = {
     UNKNOWN_ID: (Refusal.UNKNOWN_ID, "expected the id of an object that was described, got {id}"),
@@ -337,6 +342,8 @@ def _store(bodies: Any, i: int, numbers: Any, k: int, flags: int, time: float) -
             bodies.angular[i, c] = numbers[k, 10 + c]
     elif bodies.seen[i] and (flags & _DISCONTINUITY) == 0:
         _estimate_twist(bodies, i, numbers[k, :3], (x, y, z, w), time - bodies.time[i])
+        if (flags & _BODY_TWIST) != 0:
+            _bend_twist(bodies, i, time - bodies.time[i])
         for c in range(3 if accelerates else 0):
             # the estimate is the mean velocity since the last state, which the body had half-way
             bodies.linear[i, c] += 0.5 * numbers[k, 13 + c] * (time - bodies.time[i])
@@ -352,8 +359,40 @@ def _store(bodies: Any, i: int, numbers: Any, k: int, flags: int, time: float) -
         bodies.position[i, c] = numbers[k, c]
     bodies.quaternion[i, 0], bodies.quaternion[i, 1] = x, y
     bodies.quaternion[i, 2], bodies.quaternion[i, 3] = z, w
+    bodies.course[i] = STRAIGHT
+    if (flags & (_BODY_TWIST | _STOPS)) != 0:
+        _set_course(bodies, i, flags)
     bodies.time[i] = time
     bodies.seen[i] = True
+
+
+@inlined
+def _turned(q: Any, i: int, v: Any) -> Vector:
+    """Vector v[i] along the axes of a body with orientation q[i], in world axes."""
+    x, y, z, w = q[i, 0], q[i, 1], q[i, 2], q[i, 3]
+    a = v[i, 0], v[i, 1], v[i, 2]
+    half = cross((x, y, z), a)
+    double = cross((x, y, z), (half[0] + w * a[0], half[1] + w * a[1], half[2] + w * a[2]))
+    return a[0] + 2.0 * double[0], a[1] + 2.0 * double[1], a[2] + 2.0 * double[2]
+
+
+@device
+def _set_course(bodies: Any, i: int, flags: int) -> None:
+    """Set the course of body i, whose state has a twist along its own axes (BODY_TWIST) or ends at rest (STOPS)."""
+    turns, q = (flags & _BODY_TWIST) != 0, bodies.quaternion
+    v, w = bodies.linear, bodies.angular
+    if turns and (flags & _TWIST_UNKNOWN) == 0:
+        v[i, 0], v[i, 1], v[i, 2] = _turned(q, i, v)
+        w[i, 0], w[i, 1], w[i, 2] = _turned(q, i, w)
+    a = bodies.acceleration
+    if turns:
+        a[i, 0], a[i, 1], a[i, 2] = _turned(q, i, a)
+    course = course_of(
+        (v[i, 0], v[i, 1], v[i, 2]), (w[i, 0], w[i, 1], w[i, 2]), (a[i, 0], a[i, 1], a[i, 2]), turns,
+        (flags & _STOPS) != 0,
+    )  # fmt: skip
+    bodies.course[i], bodies.rest[i] = course.kind, course.rest
+    a[i, 0], a[i, 1], a[i, 2] = course.acceleration
 
 
 @device
@@ -374,3 +413,24 @@ def _estimate_twist(bodies: Any, i: int, position: Any, quaternion: Any, elapsed
         sign = 1.0 if rw >= 0.0 else -1.0
         rate = 2.0 * sign * np.arctan2(s, abs(rw)) / (s * elapsed)
     bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2] = rate * rx, rate * ry, rate * rz
+
+
+@device
+def _bend_twist(bodies: Any, i: int, elapsed: float) -> None:
+    """Change the estimate of body i's velocity from the mean one, along the chord of its arc, to the last one.
+
+    The mean velocity has the direction of half-way; across the axis of the rotation, the arc is longer than the chord.
+    """
+    v = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
+    w = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
+    half = 0.5 * elapsed * magnitude(w)
+    if not (half > 0.0 and dot(w, w) > 0.0):
+        return
+    along, longer = dot(w, v) / dot(w, w), half / sin_cos(half)[0]
+    v = (
+        along * w[0] + longer * (v[0] - along * w[0]),
+        along * w[1] + longer * (v[1] - along * w[1]),
+        along * w[2] + longer * (v[2] - along * w[2]),
+    )
+    last = place_on(ARC, v, w, (0.0, 0.0, 0.0), 0.5 * elapsed, inf).velocity
+    bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2] = last

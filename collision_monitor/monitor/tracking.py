@@ -7,7 +7,7 @@ predictions are continued before they end. A stale object widens its bounds here
 
 from __future__ import annotations
 
-from math import sqrt
+from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -16,12 +16,15 @@ from numpy.typing import NDArray
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor.broad_phase.hashed_grid import HashedGrid, put_box, remove_boxes
+from collision_monitor.geometry.vector import magnitude, minus, scaled
 from collision_monitor.monitor import filters
 from collision_monitor.monitor.adaptive_tubes import FUTILE_STEPS, NARROWEST, PATIENCE, Unrest, fit_width, widest_tube
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
-from collision_monitor.motion.motion import age_of, position_now, quaternion_to_matrix, swept_box, turn_quaternion
+from collision_monitor.motion.course import STRAIGHT
+from collision_monitor.motion.last_state import age_of, set_reference, twist_now
+from collision_monitor.motion.motion import swept_box, twist_at
 from collision_monitor.motion.turning import BLOCK, COLUMNS, make_columns, turned_away
 from collision_monitor.uncertainty.spread import surface_spread, swing_radius
 
@@ -216,6 +219,8 @@ def _deviation(
     """
     m = bodies.motion[i]
     age, since = now - bodies.time[i], now - m.time
+    if m.course != STRAIGHT or bodies.course[i] != STRAIGHT:
+        return _course_deviation(bodies, i, now, horizon, stale_acceleration, angle)
     dx = bodies.position[i, 0] - m.x + (bodies.linear[i, 0] * age - m.vx * since)
     dy = bodies.position[i, 1] - m.y + (bodies.linear[i, 1] * age - m.vy * since)
     dz = bodies.position[i, 2] - m.z + (bodies.linear[i, 2] * age - m.vz * since)
@@ -241,6 +246,41 @@ def _deviation(
         drift += r * off
         # the angle is of the last state's time; from then to now it grows at most by the difference of the rates
         apart += r * (angle + off * age)
+    return apart, drift
+
+
+@device
+def _course_deviation(
+    bodies: Any, i: int, now: float, horizon: float, stale_acceleration: float, angle: float
+) -> tuple[float, float]:
+    """`_deviation` of a body that brakes or goes along an arc, in its last state or in its reference motion.
+
+    T seconds from now, two velocities differ by at most what they do now, T times what their changes of speed do, and
+    the speed times the angle between both headings, T times the difference of the rates of turn and T^2 / 2 times that
+    of their changes. A body is predicted at most two horizons far.
+    """
+    m = bodies.motion[i]
+    age = now - bodies.time[i]
+    if m.course != bodies.course[i] or (m.rest < inf) != (bodies.rest[i] < inf):
+        return inf, inf
+    own, other = twist_now(bodies, i, age), twist_at(m, now)
+    p, x, y, z = bodies.position, other.moved[0] + m.x, other.moved[1] + m.y, other.moved[2] + m.z
+    apart = magnitude((p[i, 0] - x + own.moved[0], p[i, 1] - y + own.moved[1], p[i, 2] - z + own.moved[2]))
+    off = magnitude(minus(own.angular, other.angular))
+    slower = bend = 0.0
+    if own.change != 0.0 or other.change != 0.0:
+        slower = magnitude(minus(scaled(own.velocity, own.change), scaled(other.velocity, other.change)))
+        bend = magnitude(minus(scaled(own.angular, own.change), scaled(other.angular, other.change)))
+    fastest = max(magnitude(own.velocity), magnitude(other.velocity))
+    fastest *= 1.0 + 2.0 * horizon * max(own.change, other.change, 0.0)
+    drift = magnitude(minus(own.velocity, other.velocity))
+    drift += horizon * (slower + fastest * (off + 2.0 / 3.0 * horizon * bend))
+    apart += 0.5 * stale_acceleration * age * age
+    drift += stale_acceleration * age
+    r = bodies.spin_radius[i]
+    if r > 0.0:
+        drift += r * (off + horizon * bend)
+        apart += r * (angle + (off + 0.5 * bend * age) * age)
     return apart, drift
 
 
@@ -272,7 +312,7 @@ def _is_covered(
     m = bodies.motion[i]
     age = now - bodies.time[i]
     radius = bodies.spin_radius[i]
-    off, growth = surface_spread(spread, i, radius, age, horizon, stale_acceleration)
+    off, growth = surface_spread(bodies, spread, i, radius, age, horizon, stale_acceleration)
     return sigmas * off <= m.spread_0 + m.spread_1 * (now - m.tube_time) and sigmas * growth <= m.spread_1
 
 
@@ -289,7 +329,8 @@ def _cover_spread(
     m.spread_0 = m.spread_1 = 0.0
     if sigmas > 0.0 and not bodies.static[i]:
         age = 2.0 * (now - bodies.time[i])
-        off, growth = surface_spread(spread, i, swing_radius(bodies, spread, i), age, m.cover - now, stale_acceleration)
+        radius = swing_radius(bodies, spread, i)
+        off, growth = surface_spread(bodies, spread, i, radius, age, m.cover - now, stale_acceleration)
         m.spread_0, m.spread_1 = min(WIDER * sigmas * off, most[0]), min(WIDER * sigmas * growth, most[1])
 
 
@@ -350,16 +391,8 @@ def restart_motion(
         m = bodies.motion[i]
         bodies.version[i] += np.uint32(1)
         age = age_of(bodies, i, now)
-        m.vx, m.vy, m.vz = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
-        m.wx, m.wy, m.wz = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
-        m.ax, m.ay, m.az = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]
-        m.x = position_now(bodies, i, age, 0)
-        m.y = position_now(bodies, i, age, 1)
-        m.z = position_now(bodies, i, age, 2)
-        m.vx, m.vy, m.vz = m.vx + m.ax * age, m.vy + m.ay * age, m.vz + m.az * age
-        turn_quaternion(bodies.quaternion, i, m.wx, m.wy, m.wz, age, bodies.ref_quaternion[i])
-        quaternion_to_matrix(bodies.ref_quaternion, i, m.rotation)
-        m.time = m.tube_time = now
+        set_reference(bodies, i, age, now, bodies.ref_quaternion, i, m)
+        m.tube_time = now
         m.covered = -np.inf
         m.tube_0 = m.tube_1 = 0.0
         _cover(bodies, i, now, horizons[i])

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import kernel
-from collision_monitor.impact.acceleration_bounds import Intervals, widen_intervals
+from collision_monitor.impact.acceleration_bounds import Intervals, first_possible_impacts, widen_intervals
 from collision_monitor.impact.impact_record import holds, ids_of_keys, pair_keys, write_pair
 from collision_monitor.impact.pair_impacts import cover_of
 from collision_monitor.monitor.budget import SAMPLE, PairBudget
@@ -33,7 +33,7 @@ from collision_monitor.uncertainty.plane_memory import PlaneMemory, make_plane_m
 from collision_monitor.uncertainty.plane_probability import LEFT, plane_probabilities
 from collision_monitor.uncertainty.samples.error_samples import Workspace, make_workspace
 from collision_monitor.uncertainty.samples.normal_samples import normal_samples, sample_columns
-from collision_monitor.uncertainty.spread import Spread, is_uncertain, make_spread, take_spread
+from collision_monitor.uncertainty.spread import FIFTH_ROOT, Spread, is_uncertain, make_spread, take_spread
 from collision_monitor.uncertainty.uncertainty import (
     COSTLY_PARTS,
     SPINNING_PARTS,
@@ -171,8 +171,14 @@ class UncertainPredictions(Stage):
         self.active = True
 
     def sigmas(self, profile: Profile) -> float:
-        """Number of standard deviations by which swept boxes are widened; 0 while nothing is uncertain."""
-        return sigmas_for(profile.min_probability) if self.counts(profile) else 0.0
+        """Number of standard deviations by which swept boxes are widened; 0 while nothing is uncertain.
+
+        With declared bounds on accelerations, at least so many that the boxes hold what these allow.
+        """
+        if not self.counts(profile):
+            return 0.0
+        sigmas = sigmas_for(profile.min_probability)
+        return max(sigmas, 1.0 / FIFTH_ROOT) if self.spread.acceleration.any() else sigmas
 
     def counts(self, profile: Profile) -> bool:
         """Whether anything is uncertain, and the profile includes it."""
@@ -219,7 +225,7 @@ class UncertainPredictions(Stage):
         self.add_pairs(step, np.empty((0, 2), np.int32))
         known = pair_keys(predictions["id_a"], predictions["id_b"])
         entries = _without(self._near(step), np.concatenate([known, touching]))
-        possible = self._judge_passing(step, entries, pool, budget)
+        possible = self._with_bounded(step, entries, self._judge_passing(step, entries, pool, budget))
         if budget is not None:
             budget.stop()
         return _sorted(np.concatenate([predictions, possible]) if len(possible) else predictions)
@@ -227,7 +233,7 @@ class UncertainPredictions(Stage):
     def _near(self, step: StepContext) -> Records:
         """Return the entries of the pairs that could meet within the horizon."""
         p, found = step.profile, np.empty(len(self.entries), np.int64)
-        sigmas = sigmas_for(p.min_probability)
+        sigmas = self.sigmas(p)
         nearness = NearPairRange(sigmas, step.settings.impact.margin, p.horizon, p.stale_acceleration)
         count = find_near(step.roster.multibody, self.spread, self.entries, step.now, nearness, found)
         return self.entries[found[:count]]
@@ -248,6 +254,32 @@ class UncertainPredictions(Stage):
         rows["status"][left], rows["method"][left] = PredictionStatus.UNRESOLVED, Method.BOUND
         rows["lower"][left] = bounds[near[kept][left], EARLIEST]
         return rows
+
+    def _with_bounded(self, step: StepContext, entries: Records, possible: Records) -> Records:
+        """Add predictions of the pairs (ENTRY) that the declared bounds on accelerations allow to meet.
+
+        They are reported however improbable that is; their lower ends are safe. possible: predictions of some of them.
+        """
+        if not self.spread.acceleration.any() or not len(entries):
+            return possible
+        slots, first = np.stack([entries["i"], entries["j"]], axis=1), np.empty(len(entries))
+        query, horizon, work = step.settings.impact, step.profile.horizon, self._workspaces[0].exact
+        first_possible_impacts(step.roster.multibody, self.spread, slots, step.now, horizon, query, work, first)
+        meet = first < inf
+        keys, first, slots = entries["key"][meet], first[meet], slots[meet]
+        at = np.searchsorted(keys, known := pair_keys(possible["id_a"], possible["id_b"]))  # both ascend by key
+        is_known = np.zeros(len(keys), np.bool_)
+        if len(keys):
+            at = np.minimum(at, len(keys) - 1)
+            same = keys[at] == known
+            possible["lower"][same] = np.minimum(possible["lower"][same], first[at[same]])
+            is_known[at[same]] = True
+        new = ~is_known
+        answers = np.full((np.count_nonzero(new), len(ANSWERS)), nan)
+        answers[:, EARLIEST] = first[new]
+        rows = _possible(step, keys[new], slots[new], answers)
+        rows["method"] = Method.BOUND
+        return np.concatenate([possible, rows])
 
     def _judge_urgent(
         self,

@@ -18,7 +18,7 @@ LAST_STATE: Final = np.dtype(
         ("quaternion", np.float64, 4),
         ("linear", np.float64, 3),
         ("angular", np.float64, 3),
-        ("acceleration", np.float64, 3),  # 0 where it is not measured
+        ("acceleration", np.float64, 3),  # 0 where it is not measured; of its Course
     ]
 )
 """The last state of a body: two cache lines, because a contact reads it whole, of bodies in random memory order."""
@@ -50,6 +50,8 @@ class BodyTable(NamedTuple):
     linear: Any  # (N, 3)
     angular: Any  # (N, 3)
     acceleration: Any  # (N, 3)
+    course: Any  # (N,) uint8: kind of the Course from the last state on
+    rest: Any  # (N,) float64: s after the last state, from which on the body stands; read if the course is not straight
 
 
 DERIVED: Final = ("plain",)
@@ -75,8 +77,8 @@ class Multibody(NamedTuple):
 _COLUMNS: Final[dict[str, Any]] = {
     **dict.fromkeys(("used", "static", "seen", "revolved", "concave"), np.bool_),
     **dict.fromkeys(("id", "version", "group", "mask"), np.uint32),
-    **dict.fromkeys(("spin_radius", "excess", "slack", "time"), np.float64),
-    **dict.fromkeys(("plain", "model"), np.uint8),
+    **dict.fromkeys(("spin_radius", "excess", "slack", "time", "rest"), np.float64),
+    **dict.fromkeys(("plain", "model", "course"), np.uint8),
     "first_shape": np.int32,
     "motion": MOTION,
     "ref_quaternion": (np.float64, 4),
@@ -91,6 +93,7 @@ def make_bodies(capacity: int) -> BodyTable:
     bodies = BodyTable(**columns, **{name: state[name] for name in state.dtype.names or ()})
     bodies.first_shape[:] = -1
     bodies.motion["covered"] = -np.inf
+    bodies.rest[:] = bodies.motion["rest"] = np.inf
     return bodies
 
 

@@ -77,7 +77,7 @@ def _panel(axes: Axes, history: History, facts: ReportFacts, collision: Collisio
             axes.fill(*(outline - middle).T, facecolor=color, edgecolor=color, alpha=0.4, linewidth=1.2)
             if not described.static:
                 bodies.append(outline - middle)
-        if np.any(path.linear) and collision.begin - 0.5 * AROUND >= path.time[0]:
+        if np.any(path.states["linear"]) and collision.begin - 0.5 * AROUND >= path.time[0]:
             earlier = path.at(now - 0.5 * AROUND)
             for outline in footprint(described, earlier[0][0], earlier[1][0]):
                 axes.fill(*(outline - middle).T, facecolor="none", edgecolor=color, linestyle=":", linewidth=1)
@@ -105,7 +105,7 @@ def _line(path: ObjectTrack, begin: float) -> Floats:
     near = np.flatnonzero(np.abs(path.time - begin) <= AROUND)
     near = near[:: max(-(-len(near) // POINTS), 1)]
     jumps = np.flatnonzero(path.jump[near])
-    return np.insert(path.position[near], jumps, np.nan, axis=0)
+    return np.insert(path.states["position"][near], jumps, np.nan, axis=0)
 
 
 def _zoom(axes: Axes, tracks: list[Floats], bodies: list[Floats]) -> None:

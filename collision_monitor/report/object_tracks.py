@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.motion.moved_states import moved_states
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.objects.models import Modelled, containing_model
-from collision_monitor.records import StateFlag
+from collision_monitor.records import STATE, StateFlag
 from collision_monitor.session.history.history import Floats, History, Pair
-from collision_monitor.shapes.pose import from_rotation_vector, multiply, rotation_matrix
+from collision_monitor.shapes.pose import rotation_matrix
 from collision_monitor.shapes.shape_table import ShapeTableBuilder, take
 
 MOST_PIECE_PAIRS: Final = 64
@@ -24,17 +25,14 @@ MOST_TIMES: Final = 800
 
 @dataclass(frozen=True, eq=False)
 class ObjectTrack:
-    """States of one object: time (n,) s, position (n, 3) m, quaternion (n, 4), linear (n, 3) m/s, angular (n, 3) rad/s.
+    """States (n,) of records.STATE of one object, with their times (n,) s.
 
     jump (n,): the object jumped to this state and did not move from the state before. A static object has one state,
     with time -inf.
     """
 
     time: Floats
-    position: Floats
-    quaternion: Floats
-    linear: Floats
-    angular: Floats
+    states: Any
     jump: NDArray[np.bool_]
 
     def at(self, times: Floats) -> tuple[Floats, Floats, Floats]:
@@ -45,9 +43,8 @@ class ObjectTrack:
         i = np.searchsorted(self.time, times, side="right") - 1
         with np.errstate(invalid="ignore"):
             age = np.where(i >= 0, times - self.time[np.maximum(i, 0)], np.nan)
-        i, dt = np.maximum(i, 0), np.nan_to_num(age, posinf=0.0)[:, None]
-        turned = multiply(from_rotation_vector(self.angular[i] * dt), self.quaternion[i])
-        return self.position[i] + self.linear[i] * dt, turned, np.where(np.isposinf(age), 0.0, age)
+        moved = moved_states(self.states[np.maximum(i, 0)], np.nan_to_num(age, posinf=0.0))
+        return moved["position"], moved["quaternion"], np.where(np.isposinf(age), 0.0, age)
 
 
 class Tracks:
@@ -68,9 +65,9 @@ class Tracks:
     def _read(self, object_id: int) -> ObjectTrack | None:
         described = self._history.objects.get(object_id)
         if described is not None and described.static and described.pose is not None:
-            pose, none = described.pose, np.zeros((1, 3))
-            always = np.array([-np.inf])
-            return ObjectTrack(always, pose.position[None], pose.quaternion[None], none, none, np.zeros(1, np.bool_))
+            stands: Any = np.zeros(1, STATE)
+            stands["position"], stands["quaternion"] = described.pose.position, described.pose.quaternion
+            return ObjectTrack(np.array([-np.inf]), stands, np.zeros(1, np.bool_))
         low, high = np.searchsorted(self._ids, [object_id, object_id + 1])
         mine = self._order[low:high]
         rows, time = self._history.states[mine], self._history.state_time[mine]
@@ -80,9 +77,9 @@ class Tracks:
         if not good.any():
             return None
         rows, time = rows[good], time[good]
-        linear, angular = (np.where(np.isfinite(rows[name]), rows[name], 0.0) for name in ("linear", "angular"))
-        jump = (rows["flags"] & StateFlag.DISCONTINUITY) != 0
-        return ObjectTrack(time, rows["position"].copy(), rows["quaternion"].copy(), linear, angular, jump)
+        for name in ("linear", "angular", "acceleration"):
+            rows[name] = np.where(np.isfinite(rows[name]), rows[name], 0.0)
+        return ObjectTrack(time, rows, (rows["flags"] & StateFlag.DISCONTINUITY) != 0)
 
     def distance(self, pair: Pair) -> tuple[Floats, Floats] | None:
         """Return times (n,) and signed distances (n,) in m, NaN without a recent state. None if nothing is known."""

@@ -1,4 +1,4 @@
-"""Poses, motions and quaternion functions.
+"""Poses and quaternion functions.
 
 Quaternions are (x, y, z, w), as in ROS. A rotation matrix R_WA takes vectors of frame A to frame W.
 """
@@ -88,8 +88,8 @@ def _plain(value: Any) -> Any:
     raise TypeError
 
 
-def _three(value: Any) -> tuple[float, float, float]:
-    """Return three finite numbers. Raises one of _REFUSED for anything else."""
+def three_numbers(value: Any) -> tuple[float, float, float]:
+    """Return three finite numbers. Raises one of REFUSED for anything else."""
     x, y, z = _plain(value)
     if not (type(x) is float and type(y) is float and type(z) is float):
         x, y, z = real_number(x), real_number(y), real_number(z)
@@ -102,7 +102,8 @@ def _three(value: Any) -> tuple[float, float, float]:
     raise ValueError
 
 
-_REFUSED: Final = (TypeError, ValueError, OverflowError)
+REFUSED: Final = (TypeError, ValueError, OverflowError)
+"""What `three_numbers` raises."""
 
 
 def _matrix_error(X: Array) -> PoseError:
@@ -143,11 +144,11 @@ class Pose(Frozen):
                 f"Pose: expected a position and a quaternion, got {2 + len(others)} arguments; write Pose((x, y, z))"
             )
         try:
-            at = _three(position)
+            at = three_numbers(position)
             x, y, z, w = _plain(quaternion)
             if not (type(x) is float and type(y) is float and type(z) is float and type(w) is float):
                 x, y, z, w = real_number(x), real_number(y), real_number(z), real_number(w)
-        except _REFUSED:
+        except REFUSED:
             at = tuple(checked_vector(position, "position").tolist())
             x, y, z, w = checked_vector(quaternion, "quaternion", 4).tolist()
         norm = sqrt(x * x + y * y + z * z + w * w)
@@ -260,71 +261,6 @@ class Pose(Frozen):
         return Pose(self.position + self.rotation @ other.position, multiply(self.quaternion, other.quaternion))
 
 
-class Motion(Frozen):
-    """A pose, its twist and its linear acceleration, in the world frame. Raises PoseError.
-
-    linear (m/s) and acceleration (m/s^2) refer to the body's origin; angular is in rad/s. The arrays (3,) are
-    read-only. The pose may be given as `as_pose` takes it.
-
-    >>> Motion(Pose(), linear=(1, 0, 0), angular=(0, 0, 0.5)).at(2.0).position
-    array([2., 0., 0.])
-    """
-
-    pose: Pose
-    numbers: tuple[float, ...]
-    linear: Array
-    angular: Array
-    acceleration: Array
-
-    def __init__(
-        self,
-        pose: Any,
-        linear: Any = (0.0, 0.0, 0.0),
-        angular: Any = (0.0, 0.0, 0.0),
-        acceleration: Any = (0.0, 0.0, 0.0),
-    ) -> None:
-        known = self.__dict__
-        known["pose"] = pose if type(pose) is Pose else as_pose(pose, "Motion, pose")
-        try:
-            known["numbers"] = (*_three(linear), *_three(angular), *_three(acceleration))
-        except _REFUSED:
-            named = {"linear velocity": linear, "angular velocity": angular, "acceleration": acceleration}
-            known["numbers"] = tuple(
-                number for name, value in named.items() for number in checked_vector(value, name).tolist()
-            )
-
-    def __getattr__(self, name: str) -> Any:
-        """Make an array when it is first read."""
-        if name not in _PLACE:
-            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
-        value = np.array(self.numbers[_PLACE[name]])
-        value.setflags(write=False)
-        self.__dict__[name] = value
-        return value
-
-    def __repr__(self) -> str:
-        """Return the pose and what is not zero, for a person."""
-        parts = [repr(self.pose)]
-        for name, place in _PLACE.items():
-            if any(self.numbers[place]):
-                parts.append(f"{name}=({', '.join(f'{each:.6g}' for each in self.numbers[place])})")
-        return f"{type(self).__name__}({', '.join(parts)})"
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Copies and pickles hold the numbers alone."""
-        linear, angular, acceleration = (self.numbers[place] for place in _PLACE.values())
-        return type(self), (self.pose, linear, angular, acceleration)
-
-    def at(self, time: float) -> Pose:
-        """The pose after `time` seconds at constant angular velocity and acceleration."""
-        turn = from_rotation_vector(self.angular * time)
-        moved = (self.linear + 0.5 * self.acceleration * time) * time
-        return Pose(self.pose.position + moved, multiply(turn, self.pose.quaternion))
-
-
-_PLACE: Final = {"linear": slice(0, 3), "angular": slice(3, 6), "acceleration": slice(6, 9)}
-
-
 def as_pose(value: Any, name: str) -> Pose:
     """Return a pose, also of a position (3,), of x y z qx qy qz qw (7,), or of a matrix (4, 4). Raises PoseError.
 
@@ -349,10 +285,3 @@ def as_pose(value: Any, name: str) -> Pose:
     if isinstance(value, Shape):
         got += "; each shape is followed by its pose: shape_a, pose_a, shape_b, pose_b"
     raise PoseError(f"{name}: expected a Pose, (x, y, z), 7 numbers x y z qx qy qz qw or a matrix (4, 4), got {got}")
-
-
-def as_motion(value: Any, name: str) -> Motion:
-    """Return a motion. Raises PoseError for anything else; name: of the argument, for the error."""
-    if isinstance(value, Motion):
-        return value
-    raise PoseError(f"{name}: expected a Motion, got {type(value).__name__}; write Motion(pose)")

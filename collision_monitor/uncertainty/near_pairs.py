@@ -12,6 +12,8 @@ from typing import Any, NamedTuple
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.impact.body_contact import relative_now
 from collision_monitor.impact.sphere_interval import sphere_interval
+from collision_monitor.motion.course import STRAIGHT
+from collision_monitor.motion.last_state import bending_now
 from collision_monitor.shapes.kinds.box import BOX
 from collision_monitor.uncertainty.spread import is_uncertain, surface_spread, swing_radius
 
@@ -49,11 +51,15 @@ def _could_meet(multibody: Any, spread: Any, i: int, j: int, now: float, nearnes
     if not reach < inf:
         return True
     p, v, age_i, age_j = relative_now(bodies, i, j, now)
-    start_i, growth_i = surface_spread(spread, i, swing_radius(bodies, spread, i), age_i, horizon, stale_acceleration)
-    start_j, growth_j = surface_spread(spread, j, swing_radius(bodies, spread, j), age_j, horizon, stale_acceleration)
+    r_i, r_j = swing_radius(bodies, spread, i), swing_radius(bodies, spread, j)
+    start_i, growth_i = surface_spread(bodies, spread, i, r_i, age_i, horizon, stale_acceleration)
+    start_j, growth_j = surface_spread(bodies, spread, j, r_j, age_j, horizon, stale_acceleration)
     bent = 0.0
-    for c in range(3):
-        bent += abs(bodies.acceleration[j, c] - bodies.acceleration[i, c])
+    if bodies.course[i] == STRAIGHT and bodies.course[j] == STRAIGHT:
+        for c in range(3):
+            bent += abs(bodies.acceleration[j, c] - bodies.acceleration[i, c])
+    else:
+        bent = bending_now(bodies, i, age_i, horizon) + bending_now(bodies, j, age_j, horizon)
     start, growth = sigmas * (start_i + start_j), sigmas * (growth_i + growth_j) + 0.5 * bent * horizon
     if sphere_interval(p, v, reach + start, growth, horizon, 1.0)[0] == inf:
         return False

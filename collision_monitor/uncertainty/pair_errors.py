@@ -6,14 +6,24 @@ from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.geometry.vector import Vector
-from collision_monitor.uncertainty.samples.error_samples import LEFT_OVER, ORIENTATION, add_covariance, errors_turn
+from collision_monitor.geometry.vector import Vector, dot, magnitude
+from collision_monitor.motion.motion import are_straight, relative_position, relative_velocity
+from collision_monitor.uncertainty.samples.error_samples import (
+    LEFT_OVER,
+    ORIENTATION,
+    add_arc_errors,
+    add_covariance,
+    errors_turn,
+)
 from collision_monitor.uncertainty.samples.normal_samples import DIMENSIONS
 from collision_monitor.uncertainty.samples.sample_gaps import FIRST_ORDER, NOT_TURNED, SERIES
-from collision_monitor.uncertainty.spread import unknown_acceleration
+from collision_monitor.uncertainty.spread import turns_by_yaw, unknown_acceleration
 
 BENDING: Final = 0.15
 """Largest deviation of a gap from a straight line in a segment, in standard deviations of the gap."""
+
+CLOSEST_NODES: Final = 32
+"""Parts of the horizon among whose ends the closest approach of bodies that bend is sought."""
 
 TURNED: Final = 2.0
 """Standard deviations of the errors of angular velocity for which gaps are that straight."""
@@ -36,6 +46,32 @@ class PairErrors(NamedTuple):
     late: float  # s: when errors of orientation, which grow, count most
     radius: Any  # (m, m): of the bodies; 0: rotation moves nothing
     yaw_only: Any  # (bool, bool): whether errors of their orientations are about the z axis alone
+
+
+@inlined
+def closest_time(A: Any, B: Any, horizon: float) -> float:
+    """Time (s), from now to the horizon, at which the origins are closest; of bodies that bend, to 1 / 64 of it."""
+    if not are_straight(A, B):
+        least, best = inf, 0.0
+        for k in range(CLOSEST_NODES + 1):
+            t = horizon * k / CLOSEST_NODES
+            p = relative_position(A, B, t)
+            if dot(p, p) < least:
+                least, best = dot(p, p), t
+        return best
+    px, py, pz = B.x - A.x, B.y - A.y, B.z - A.z
+    vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
+    vv = vx * vx + vy * vy + vz * vz
+    return min(max(-(px * vx + py * vy + pz * vz) / vv, 0.0), horizon) if vv > 0.0 else 0.0
+
+
+@inlined
+def way_at(A: Any, B: Any, t: float) -> tuple[Vector, Vector]:
+    """Position (m) and velocity (m/s) of B's origin relative to A's at time t, without constant accelerations."""
+    if not are_straight(A, B):
+        return relative_position(A, B, t), relative_velocity(A, B, t)
+    v = (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
+    return (B.x - A.x + t * v[0], B.y - A.y + t * v[1], B.z - A.z + t * v[2]), v
 
 
 @inlined
@@ -154,6 +190,8 @@ def straight_length(A: Any, B: Any, errors: PairErrors, bending: float) -> float
     A normal that turns while the bodies pass each other bends the gap like an acceleration of the surfaces.
     """
     speed = sqrt((B.vx - A.vx) ** 2 + (B.vy - A.vy) ** 2 + (B.vz - A.vz) ** 2)
+    if not are_straight(A, B):
+        speed = magnitude((A.vx, A.vy, A.vz)) + magnitude((B.vx, B.vy, B.vz))
     rate = spin_rate(A) if errors.radius[0] > 0.0 else 0.0  # the rotation of a ball moves nothing
     rate += spin_rate(B) if errors.radius[1] > 0.0 else 0.0
     rate += TURNED * turning_rate(errors)
@@ -176,8 +214,10 @@ def set_gap_covariance(
     work.joint[:] = 0.0
     if not bodies.static[i]:
         add_covariance(spread, i, ages[0], t, right, sampling.stale_acceleration, sampling.planar, work)
+        add_arc_errors(work.motion[0], spread, i, ages[0], t, turns_by_yaw(spread, i, sampling.planar), work)
     if not bodies.static[j]:
         add_covariance(spread, j, ages[1], t, right, sampling.stale_acceleration, sampling.planar, work)
+        add_arc_errors(work.motion[1], spread, j, ages[1], t, turns_by_yaw(spread, j, sampling.planar), work)
 
 
 @inlined

@@ -13,7 +13,8 @@ from typing import Any, Final
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.impact.body_impact import ImpactQuery, ShapePair, Tube, Window
 from collision_monitor.impact.sphere_interval import sphere_interval
-from collision_monitor.motion.motion import carry_on, half_acceleration
+from collision_monitor.motion.last_state import carry_on
+from collision_monitor.motion.motion import half_acceleration
 from collision_monitor.uncertainty.impact_distribution import (
     EARLIEST,
     EVENLY_OUTWARD,
@@ -25,10 +26,12 @@ from collision_monitor.uncertainty.impact_histogram import NOT_FOUND, summarise_
 from collision_monitor.uncertainty.pair_errors import (
     PairErrors,
     acceleration_terms,
+    closest_time,
     deviation_at,
     set_gap_covariance,
     surface_bend,
     swing_bound,
+    way_at,
 )
 from collision_monitor.uncertainty.plane_impacts import enter_bodies, enter_surely
 from collision_monitor.uncertainty.round_impacts import NOT_ROUND, enter_round_bodies, round_form
@@ -47,15 +50,6 @@ from collision_monitor.uncertainty.uncertainty import (
 
 LEFT: Final = -1.0
 """Probability of a pair that this method does not answer: very fast rotation, large errors of orientation, a mesh."""
-
-
-@inlined
-def _approach(A: Any, B: Any, horizon: float) -> float:
-    """Time (s), from now to the horizon, at which the origins are closest."""
-    px, py, pz = B.x - A.x, B.y - A.y, B.z - A.z
-    vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
-    vv = vx * vx + vy * vy + vz * vz
-    return min(max(-(px * vx + py * vy + pz * vz) / vv, 0.0), horizon) if vv > 0.0 else 0.0
 
 
 @kernel
@@ -85,11 +79,11 @@ def plane_probabilities(
         has_mesh |= body_has_mesh(table, parts, bodies.first_shape[j])
         ages = (carry_on(bodies, i, now, work.quaternion, A), carry_on(bodies, j, now, work.quaternion, B))
         r_i, r_j = swing_radius(bodies, spread, i), swing_radius(bodies, spread, j)
-        now_i, growth_i = surface_spread(spread, i, r_i, ages[0], horizon, stale_acceleration)
-        now_j, growth_j = surface_spread(spread, j, r_j, ages[1], horizon, stale_acceleration)
+        now_i, growth_i = surface_spread(bodies, spread, i, r_i, ages[0], horizon, stale_acceleration)
+        now_j, growth_j = surface_spread(bodies, spread, j, r_j, ages[1], horizon, stale_acceleration)
         tube = Tube(now_i + now_j, growth_i + growth_j)
-        bend = surface_bend(A, r_i) + surface_bend(B, r_j) + 2.0 * half_acceleration(A, B)
-        t = closest = _approach(A, B, horizon) if A.radius + B.radius < inf else 0.0
+        bend = surface_bend(A, r_i) + surface_bend(B, r_j) + 2.0 * half_acceleration(A, B, 0.0, horizon)
+        t = closest = closest_time(A, B, horizon) if A.radius + B.radius < inf else 0.0
         swing_i, swing_j = swing_bound(spread, i, r_i, ages[0], horizon), swing_bound(spread, j, r_j, ages[1], horizon)
         turning = (swing_i[0] + swing_j[0], swing_i[1] + swing_j[1])
         flat = not (r_i < inf and r_j < inf)
@@ -124,12 +118,10 @@ def plane_probabilities(
         if has_mesh or most > TURNED_FARTHEST or (flat and most > 0.0):
             answers[k, PROBABILITY] = LEFT
             continue
+        there, v = way_at(A, B, t)
         if sampling.stated:
-            frame = work.frame
-            frame[0, 0] = B.x - A.x + t * (B.vx - A.vx)
-            frame[0, 1] = B.y - A.y + t * (B.vy - A.vy)
-            frame[0, 2] = B.z - A.z + t * (B.vz - A.vz)
-        set_frame(work.frame, B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
+            work.frame[0, 0], work.frame[0, 1], work.frame[0, 2] = there
+        set_frame(work.frame, *v)
         set_gap_covariance(multibody, spread, i, j, ages, t, right, sampling, work)
         pair = ShapePair(A, B, bodies.first_shape[i], bodies.first_shape[j])
         far_i, far_j = r_i if r_i < inf else 0.0, r_j if r_j < inf else 0.0  # a half-space does not turn
@@ -174,7 +166,7 @@ def _first_meeting(A: Any, B: Any, tube: Tube, sampling: Any) -> float:
     reach = A.radius + B.radius + sampling.query.margin + sampling.safe_sigmas * tube.start
     if not reach < inf:
         return 0.0
-    growth = sampling.safe_sigmas * tube.growth + half_acceleration(A, B) * sampling.horizon
+    growth = sampling.safe_sigmas * tube.growth + half_acceleration(A, B, 0.0, sampling.horizon) * sampling.horizon
     p, v = (B.x - A.x, B.y - A.y, B.z - A.z), (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
     return sphere_interval(p, v, reach, growth, sampling.horizon, 1.0)[0]
 

@@ -69,7 +69,7 @@ def _shared(ends: Any) -> float:
 def round_form(table: Any, parts: Any, pair: Any, errors: Any, margin: float, work: Any) -> int:
     """Form of two bodies with these first shapes, see NOT_ROUND. A cylinder may turn about its own axis."""
     A, B, a, b = pair
-    if parts.next[a] >= 0 or parts.next[b] >= 0 or half_acceleration(A, B) > 0.0:
+    if parts.next[a] >= 0 or parts.next[b] >= 0 or half_acceleration(A, B, 0.0, errors.late) > 0.0:
         return NOT_ROUND
     is_off = errors.bend > 0.0 or errors_turn(errors.turning[0]) or errors_turn(errors.turning[1])
     if table.kind[a] == SPHERE and table.kind[b] == SPHERE:

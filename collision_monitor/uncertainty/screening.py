@@ -70,7 +70,7 @@ def meeting(
     R_a, R_b = work.scratch.rotation[0], work.scratch.rotation[1]
     oa, ob = place_shape(table, parts, a, A.rotation, R_a), place_shape(table, parts, b, B.rotation, R_b)
     p = (B.x - A.x + ob[0] - oa[0], B.y - A.y + ob[1] - oa[1], B.z - A.z + ob[2] - oa[2])
-    bent = half_acceleration(A, B) * horizon
+    bent = half_acceleration(A, B, 0.0, horizon) * horizon
     bent += sqrt((A.wx * A.wx + A.wy * A.wy + A.wz * A.wz) * (oa[0] * oa[0] + oa[1] * oa[1] + oa[2] * oa[2]))
     bent += sqrt((B.wx * B.wx + B.wy * B.wy + B.wz * B.wz) * (ob[0] * ob[0] + ob[1] * ob[1] + ob[2] * ob[2]))
     return sphere_interval(p, (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz), reach, tube.growth + bent, horizon, 1.0)

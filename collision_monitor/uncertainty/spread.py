@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
+from collision_monitor.geometry.vector import magnitude
+from collision_monitor.motion.course import ARC
 from collision_monitor.records import StateFlag
 
 FIFTH_ROOT: Final = 0.4472135954999579
@@ -29,6 +31,9 @@ _YAW_ONLY: Final = int(StateFlag.YAW_ONLY)
 UPRIGHT: Final = 1e-6
 """Largest tilt (rad) of an axis, or rate of it (rad/s), with which it counts as vertical."""
 
+
+LEAST_SWING: Final = 1e-6
+"""m: in place of 0 for a body on an arc."""
 
 SEMI_DEFINITE: Final = 1e-9
 """Largest magnitude of a negative eigenvalue, relative to the largest one, that counts as the sender's round-off."""
@@ -121,7 +126,12 @@ def turns_by_yaw(spread: Spread, i: int, planar: bool) -> bool:
 
 @device
 def swing_radius(bodies: Any, spread: Spread, i: int) -> float:
-    """Distance (m) of the farthest point that errors of orientation move; 0: none, as of an upright cylinder by yaw."""
+    """Distance (m) of the farthest point that errors of orientation move; 0: none, as of an upright cylinder by yaw.
+
+    They turn the arc of a body too, even if they do not move its surface.
+    """
+    if bodies.course[i] == ARC:
+        return max(bodies.spin_radius[i], LEAST_SWING)
     if not (bodies.revolved[i] and turns_by_yaw(spread, i, False)):
         return bodies.spin_radius[i]
     x, y, wx, wy = bodies.quaternion[i, 0], bodies.quaternion[i, 1], bodies.angular[i, 0], bodies.angular[i, 1]
@@ -143,12 +153,13 @@ def unknown_acceleration(spread: Spread, i: int, silent: bool, which: int, stale
 
 @device
 def surface_spread(
-    spread: Spread, i: int, radius: float, age: float, ahead: float, stale_acceleration: float
+    bodies: Any, spread: Spread, i: int, radius: float, age: float, ahead: float, stale_acceleration: float
 ) -> tuple[float, float]:
     """Bound the standard deviation along one axis of every point of body i: now (m), and growth until `ahead` (m/s).
 
     radius: swing_radius; age, ahead: s since the last state, s from now. The parts are added instead of their squares,
-    so that the bound is linear in time and never too low.
+    so that the bound is linear in time and never too low. An error of the orientation turns the path of a body on an
+    arc too.
     """
     s_p, s_o = spread.stddev[i, 0], spread.stddev[i, 1]
     s_v, s_w = spread.stddev[i, 2], spread.stddev[i, 3]
@@ -160,4 +171,8 @@ def surface_spread(
     if s_o + s_w + turning > 0.0:  # else 0 * inf for a half-space, which does not turn
         now += radius * (s_o + s_w * age + 0.5 * turning * age * age)
         growth += radius * (s_w + turning * (age + 0.5 * ahead))
+        if bodies.course[i] == ARC:
+            v = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
+            off = s_o + s_w * (age + ahead) + 0.5 * turning * (age + ahead) * (age + ahead)
+            now, growth = now + magnitude(v) * age * off, growth + magnitude(v) * off
     return now, growth

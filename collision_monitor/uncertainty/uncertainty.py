@@ -28,13 +28,14 @@ from collision_monitor.impact.impact_record import CLEAR
 from collision_monitor.impact.sphere_interval import sphere_interval
 from collision_monitor.impact.tree_impact import spins
 from collision_monitor.motion.bodies import next_pair
-from collision_monitor.motion.motion import carry_on, half_acceleration, relative_position
+from collision_monitor.motion.last_state import carry_on
+from collision_monitor.motion.motion import are_straight, half_acceleration, relative_position
 from collision_monitor.narrow_phase.contact_row import NORMAL, POINT_A, POINT_B
 from collision_monitor.shapes.kinds.mesh import MESH
 from collision_monitor.shapes.kinds.points import POINTS
 from collision_monitor.uncertainty.impact_distribution import summarise
 from collision_monitor.uncertainty.obstacle_planes import NOT_OFF
-from collision_monitor.uncertainty.pair_errors import spin_rate
+from collision_monitor.uncertainty.pair_errors import closest_time, spin_rate, way_at
 from collision_monitor.uncertainty.samples.chosen_samples import open_ranks
 from collision_monitor.uncertainty.samples.error_samples import (
     LEFT_OVER,
@@ -127,7 +128,7 @@ def first_contact(multibody: Any, i: int, j: int, window: Window, tube: Tube, qu
     reach = A.radius + B.radius + query.margin + tube.start
     if reach < inf:
         p, v = (B.x - A.x, B.y - A.y, B.z - A.z), (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz)
-        bent = half_acceleration(A, B) * end
+        bent = half_acceleration(A, B, 0.0, end) * end
         first, last = sphere_interval(p, v, reach, tube.growth + bent, end, 1.0)
         if bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0 and bent == 0.0:  # single spheres
             return first
@@ -191,7 +192,7 @@ def _is_straight(parts: Any, bodies: Any, i: int, j: int, A: Any, B: Any) -> boo
     a, b = bodies.first_shape[i], bodies.first_shape[j]
     bends = A.wx != 0.0 or A.wy != 0.0 or A.wz != 0.0 or B.wx != 0.0 or B.wy != 0.0 or B.wz != 0.0
     round = bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0
-    bends = bends or half_acceleration(A, B) > 0.0
+    bends = bends or not are_straight(A, B) or half_acceleration(A, B, 0.0, 1.0) > 0.0
     return not bends and not round and parts.next[a] < 0 and parts.next[b] < 0
 
 
@@ -231,17 +232,13 @@ def _lay_along(multibody: Any, i: int, j: int, tube: Tube, sampling: Sampling, w
     """
     bodies, horizon = multibody.bodies, sampling.horizon
     A, B, frame, normal = work.motion[0], work.motion[1], work.frame, work.block[0]
-    vx, vy, vz = B.vx - A.vx, B.vy - A.vy, B.vz - A.vz
-    px, py, pz = B.x - A.x, B.y - A.y, B.z - A.z
     round = bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0
     t = 0.0
     if (sampling.stated or round) and A.radius + B.radius < inf:
-        vv = vx * vx + vy * vy + vz * vz
-        if vv > 0.0:
-            t = min(max(-(px * vx + py * vy + pz * vz) / vv, 0.0), horizon)
+        t = closest_time(A, B, horizon)
         if sampling.stated and not round:
             t = likely_contact(multibody, i, j, t, horizon, sampling.query, work)
-        frame[0, 0], frame[0, 1], frame[0, 2] = px + t * vx, py + t * vy, pz + t * vz
+        frame[0, 0], frame[0, 1], frame[0, 2] = way_at(A, B, t)[0]
     else:
         least = inf
         for node in range(GAP_NODES):
@@ -251,7 +248,7 @@ def _lay_along(multibody: Any, i: int, j: int, tube: Tube, sampling: Sampling, w
             if beta < least:
                 t, least = at, beta
                 frame[0, 0], frame[0, 1], frame[0, 2] = normal[0], normal[1], normal[2]
-    set_frame(frame, vx, vy, vz)
+    set_frame(frame, *way_at(A, B, t)[1])
     return t
 
 
@@ -442,8 +439,8 @@ def impact_probabilities(
         age_i = carry_on(bodies, i, now, work.quaternion, A)
         age_j = carry_on(bodies, j, now, work.quaternion, B)
         r_i, r_j = swing_radius(bodies, spread, i), swing_radius(bodies, spread, j)
-        now_i, growth_i = surface_spread(spread, i, r_i, age_i, horizon, stale_acceleration)
-        now_j, growth_j = surface_spread(spread, j, r_j, age_j, horizon, stale_acceleration)
+        now_i, growth_i = surface_spread(bodies, spread, i, r_i, age_i, horizon, stale_acceleration)
+        now_j, growth_j = surface_spread(bodies, spread, j, r_j, age_j, horizon, stale_acceleration)
         tube = Tube(now_i + now_j, growth_i + growth_j)
         coarse = max(query.tolerance, SAMPLE_TOLERANCE * tube.start)
         a, b = bodies.first_shape[i], bodies.first_shape[j]
@@ -485,7 +482,7 @@ def impact_probabilities(
         exact = has_mesh or (bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0)
         bias = 0.0 if exact else -0.75 * coarse
         p, v = (B.x, B.y, B.z), (B.vx, B.vy, B.vz)
-        w_i, w_j = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz)
+        w_i, w_j, v_i = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz), (A.vx, A.vy, A.vz)
         straight = _is_straight(parts, bodies, i, j, A, B) and not (turns_i or turns_j)
         work.axes[:, 3] = inf  # no axis is known yet
         share, is_open = weights.copy(), (0, size, size, size)
@@ -503,9 +500,9 @@ def impact_probabilities(
             if few and nth == 1:
                 is_open = open_ranks(times, order, FEW_SPARE)
             if foretells and nth == 2:
-                shift(work, np.zeros(DIMENSIONS), t, p, v)
-                turn(A, work.rotation[0], w_i, turn_i, NOT_OFF, NOT_OFF)
-                turn(B, work.rotation[1], w_j, turn_j, NOT_OFF, NOT_OFF)
+                shift(work, np.zeros(DIMENSIONS), t, p, v, w_j)
+                turn(A, work.rotation[0], w_i, v_i, turn_i, NOT_OFF, NOT_OFF)
+                turn(B, work.rotation[1], w_j, (B.vx, B.vy, B.vz), turn_j, NOT_OFF, NOT_OFF)
                 _set_sides(multibody, i, j, t, (turn_i, turn_j), yaw_only, times, 2 * size, sampling, work, sides)
                 weigh_followed(points, weights, 2 * size, sides)
             for n in range(nth * size, min((nth + 1) * size, weights.size)):
@@ -525,12 +522,13 @@ def impact_probabilities(
                 if mirrors:
                     _mirrored(z, sides.widening[0], work.sample)
                     z = work.sample
-                shift(work, z, t, p, v)
+                shift(work, z, t, p, v, w_j)
                 if turns_i:
-                    turn(A, work.rotation[0], w_i, turn_i, _unit(z, ORIENTATION, level_i), _unit(z, LEFT_OVER, level_i))
+                    own, left = _unit(z, ORIENTATION, level_i), _unit(z, LEFT_OVER, level_i)
+                    turn(A, work.rotation[0], w_i, v_i, turn_i, own, left)
                 if turns_j:
                     own, left = _unit(z, ORIENTATION + 3, level_j), _unit(z, LEFT_OVER + 3, level_j)
-                    turn(B, work.rotation[1], w_j, turn_j, own, left)
+                    turn(B, work.rotation[1], w_j, (B.vx, B.vy, B.vz), turn_j, own, left)
                 parted = 0.0
                 if straight:
                     parted = parted_until(work.axes, A, B, horizon, query.margin + bias + 0.5 * coarse)

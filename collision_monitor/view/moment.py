@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor import records
-from collision_monitor.records import StateFlag
-from collision_monitor.shapes.pose import from_rotation_vector, multiply
+from collision_monitor.motion.moved_states import moved_states
 from collision_monitor.view.bodies import DescribedBodies, Floats, Indices
 from collision_monitor.view.levels import Level, Pair
 
@@ -68,10 +67,6 @@ class Moment:
     def poses_at(self, rows: Indices, after: Floats) -> tuple[Floats, Floats]:
         """Return positions (k, 3) and quaternions (k, 4) `after` (k,) s from the step, as the last states move.
 
-        Linear motion with the stated acceleration and constant angular velocity, as `shapes.pose.Motion.at`.
         """
-        state, time = self.state[rows], (after + self.age[rows])[:, None]
-        stated = (state["flags"] & StateFlag.ACCELERATION_VALID) != 0
-        acceleration = np.where(stated[:, None], np.nan_to_num(state["acceleration"]), 0.0)
-        position = state["position"] + (state["linear"] + 0.5 * acceleration * time) * time
-        return position, multiply(from_rotation_vector(state["angular"] * time), state["quaternion"])
+        moved = moved_states(self.state[rows], after + self.age[rows])
+        return moved["position"], moved["quaternion"]

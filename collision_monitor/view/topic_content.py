@@ -236,10 +236,12 @@ def _copied(catalogue: Catalogue) -> Catalogue:
 def _are_usable(states: States) -> NDArray[np.bool_]:
     """Return which states (n,) the monitor takes for their numbers, as `monitor.intake.take_states`."""
     known = (states["flags"] & StateFlag.TWIST_UNKNOWN) == 0
+    accelerates = (states["flags"] & StateFlag.ACCELERATION_VALID) != 0
     usable: NDArray[np.bool_] = (np.abs(states["position"]) <= LARGEST_INPUT).all(axis=1)
     usable &= np.abs(np.linalg.norm(states["quaternion"], axis=1) - 1.0) <= UNIT_QUATERNION
     for field in ("linear", "angular"):
         usable &= ~known | (np.abs(states[field]) <= LARGEST_INPUT).all(axis=1)
+    usable &= ~accelerates | (np.abs(states["acceleration"]) <= LARGEST_INPUT).all(axis=1)
     return usable
 
 
@@ -268,3 +270,4 @@ def _estimate_twists(states: States, before: States, elapsed: NDArray[np.float64
     states["linear"][unknown] = moved / elapsed
     axis = turn[:, :3] / np.where(sine > 0.0, sine, 1.0)
     states["angular"][unknown] = axis * angle / elapsed
+    states["flags"][unknown] &= ~np.uint32(StateFlag.BODY_TWIST)  # these are along the world's axes

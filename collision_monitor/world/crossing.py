@@ -12,9 +12,10 @@ from math import asin, cos, hypot, pi, sin, sqrt
 import numpy as np
 
 from collision_monitor.errors import InputError
+from collision_monitor.motion.stated_motion import Motion
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
-from collision_monitor.shapes.pose import Motion, Pose, from_rotation_vector, multiply
+from collision_monitor.shapes.pose import Pose, from_rotation_vector, multiply
 from collision_monitor.shapes.registry import Box, Capsule, Shape, Sphere
 from collision_monitor.world.scene import Scene, States, positive_rate, state_array
 

@@ -16,7 +16,7 @@ from collision_monitor.alerts.protective_separation import ProtectiveSeparation
 from collision_monitor.alerts.rules import Rules
 from collision_monitor.alerts.selection import Classes
 from collision_monitor.alerts.traffic import post_encroachment_time, required_deceleration, time_headway
-from collision_monitor.shapes.pose import Motion
+from collision_monitor.motion.stated_motion import Motion
 
 SHAPES = [cm.Sphere(0.4), cm.Box((1.2, 0.5, 0.8)), cm.Capsule(0.3, 0.7), cm.Cylinder(0.25, 1.75)]
 N = 24

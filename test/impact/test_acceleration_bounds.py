@@ -110,3 +110,34 @@ def test_a_twist_estimated_from_poses_has_the_error_of_their_difference() -> Non
     v = np.array([-2.0, 0, 0]) + rng.normal(0, sqrt(2) * sigma / dt, (50_000, 3))
     t = np.clip(-(p * v).sum(1) / (v * v).sum(1), 0, HORIZON)  # nearest
     assert reported["probability"] == pytest.approx((np.linalg.norm(p + v * t[:, None], axis=1) < 1.0).mean(), abs=0.02)
+
+
+@pytest.mark.parametrize("min_probability", [0.3, 0.01])
+def test_every_pair_that_the_bounds_allow_to_meet_is_reported(min_probability: float) -> None:
+    """Two bodies that both accelerate as hard as they may, in the worst directions, for the whole horizon."""
+    rng = np.random.default_rng(21)
+    profile = Profile(horizon=4.0, min_probability=min_probability)
+    met = improbable = 0
+    for _ in range(120):
+        bound = rng.uniform(0.2, 1.5)
+        shapes = cm.Box((0.8, 0.5, 0.4)), cm.Capsule(0.2, 0.6)
+        p, v = np.array([rng.normal(size=3) * 6.0, np.zeros(3)]), rng.normal(size=(2, 3))
+        monitor = cm.Monitor(profile)
+        rows = np.zeros(2, STATE)
+        rows["id"], rows["position"], rows["linear"], rows["quaternion"] = (1, 2), p, v, (0, 0, 0, 1)
+        for k in range(2):
+            monitor.add(k + 1, shapes[k], max_linear_acceleration=bound)
+        predictions = monitor.step(1_000_000_000, rows).predictions
+        aim = p[1] - p[0] + (v[1] - v[0]) * rng.uniform(1.0, 4.0)  # towards where the other one passes
+        push = bound * aim / np.linalg.norm(aim)
+        motions = [cm.Motion(cm.Pose(p[k]), v[k], (0, 0, 0), (push, -push)[k]) for k in range(2)]
+        true = cm.time_of_impact(shapes[0], motions[0], shapes[1], motions[1], horizon=4.0)
+        if true.status == "hit" and true.lower > 0.0:
+            met += 1
+            assert len(predictions) == 1
+            assert predictions["lower"][0] <= true.upper
+            improbable += np.isnan(predictions["probability"][0])
+        if len(predictions) and np.isnan(predictions["probability"][0]):
+            assert predictions["status"][0] == PredictionStatus.POSSIBLE
+    assert met > 20
+    assert improbable > 0 or min_probability < 0.1

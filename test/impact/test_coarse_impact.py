@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 
 from collision_monitor.monitor.monitor import Monitor
+from collision_monitor.motion.stated_motion import Motion
 from collision_monitor.query.contact.contact import contact
 from collision_monitor.records import PredictionStatus
 from collision_monitor.settings.profile import Profile
-from collision_monitor.shapes.pose import Motion, Pose, from_rotation_vector
+from collision_monitor.shapes.pose import Pose, from_rotation_vector
 from collision_monitor.shapes.registry import Box, Capsule, Cone, Cylinder, Ellipsoid, Mesh, Points, Shape, Sphere
 from collision_monitor.world.arm import link
 

@@ -7,7 +7,7 @@ import pytest
 
 import collision_monitor as cm
 from collision_monitor.impact.body_impact import ShapePair, Tube, Window
-from collision_monitor.motion.motion import carry_on
+from collision_monitor.motion.last_state import carry_on
 from collision_monitor.records import STATE
 from collision_monitor.uncertainty.obstacle_planes import ABOUT_ALL, make_obstacle, set_nodes
 from collision_monitor.uncertainty.pair_errors import PairErrors, spin_rate, surface_bend

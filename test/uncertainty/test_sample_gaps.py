@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import collision_monitor as cm
 from collision_monitor.impact.body_impact import ShapePair, Window
 from collision_monitor.monitor.monitor import Monitor
-from collision_monitor.motion.motion import carry_on
+from collision_monitor.motion.last_state import carry_on
 from collision_monitor.uncertainty.obstacle_planes import (
     ABOUT_ALL,
     APART,

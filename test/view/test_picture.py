@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 
 from collision_monitor import records
 from collision_monitor.codec import Removal, encode_descriptions, encode_states
+from collision_monitor.motion.stated_motion import Motion
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.records import ContactStatus, Phase, PredictionStatus, StateFlag
-from collision_monitor.shapes.pose import Motion, Pose
+from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import (
     Box,
     Capsule,

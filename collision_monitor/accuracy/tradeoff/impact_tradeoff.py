@@ -12,10 +12,11 @@ import numpy as np
 from collision_monitor.accuracy.inputs import Workload
 from collision_monitor.errors import UnsupportedError
 from collision_monitor.geometry.bounding_volumes import KDOP_DIRECTIONS
+from collision_monitor.motion.stated_motion import Motion
 from collision_monitor.query.impact.impact import Impact
 from collision_monitor.query.impact.impact_by_method import NUMBERS
 from collision_monitor.query.impact.time_of_impact import time_of_impact
-from collision_monitor.shapes.pose import Motion, Pose
+from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.reach import reach
 from collision_monitor.shapes.registry import HalfSpace, Shape
 

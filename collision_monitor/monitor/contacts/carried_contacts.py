@@ -33,7 +33,8 @@ from collision_monitor.monitor.contacts.carried_triangles import (
     meets_by_trees,
     turning,
 )
-from collision_monitor.motion.motion import age_of, chord_angle, position_now, turn_quaternion
+from collision_monitor.motion.last_state import age_of, position_now, quaternion_now
+from collision_monitor.motion.motion import chord_angle
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A, POINT_B
 
 RELATIVE: Final = RESULT
@@ -74,18 +75,12 @@ def has_answer(row: Any) -> bool:
 
 
 @inlined
-def _turn_now(bodies: Any, i: int, now: float, q: Any) -> None:
-    wx, wy, wz = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
-    turn_quaternion(bodies.quaternion, i, wx, wy, wz, age_of(bodies, i, now), q)
-
-
-@inlined
 def _turned(bodies: Any, i: int, now: float, row: Any, at: int, q: Any) -> float:
     """Distance (m) that the surface of body i has turned since the answer. q (4,): scratch."""
     radius = bodies.spin_radius[i]
     if radius == 0.0:
         return 0.0
-    _turn_now(bodies, i, now, q)
+    quaternion_now(bodies, i, age_of(bodies, i, now), q)
     angle = chord_angle(row[at], row[at + 1], row[at + 2], row[at + 3], q[0], q[1], q[2], q[3])
     return angle * radius if angle > 0.0 else 0.0
 
@@ -123,9 +118,10 @@ def carry_contact(
         result[POINT_B + c] += relative.p[c]  # `closing_now` takes both points about body i
     result[CLOSING] = closing_now(bodies, i, j, relative, result)
     result[BOUND] += half + widening(relative, query.stale_acceleration)
+    at_i, at_j = position_now(bodies, i, relative.age_i), position_now(bodies, j, relative.age_j)
     for c in range(3):
-        result[POINT_A + c] = row[POINT_A + c] + position_now(bodies, i, relative.age_i, c)
-        result[POINT_B + c] = row[POINT_B + c] + position_now(bodies, j, relative.age_j, c)
+        result[POINT_A + c] = row[POINT_A + c] + at_i[c]
+        result[POINT_B + c] = row[POINT_B + c] + at_j[c]
     return True
 
 
@@ -177,11 +173,12 @@ def keep(
         row[c] = result[c]
     row[PLACE_I] = row[PLACE_J] = NONE if by_trees else NO_MESH
     row[BOUND] = spread if by_trees else row[BOUND] - widening(relative, query.stale_acceleration)
+    at_i, at_j = position_now(bodies, i, relative.age_i), position_now(bodies, j, relative.age_j)
     for c in range(3):
-        row[POINT_A + c] -= position_now(bodies, i, relative.age_i, c)
-        row[POINT_B + c] -= position_now(bodies, j, relative.age_j, c)
+        row[POINT_A + c] -= at_i[c]
+        row[POINT_B + c] -= at_j[c]
         row[RELATIVE + c] = relative.p[c]
     for body, at in ((i, TURN_I), (j, TURN_J)):
-        _turn_now(bodies, body, now, q)
+        quaternion_now(bodies, body, age_of(bodies, body, now), q)
         for c in range(4):
             row[at + c] = q[c]

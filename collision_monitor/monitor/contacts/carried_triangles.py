@@ -35,7 +35,7 @@ from collision_monitor.meshes.overlap.inside import OUTSIDE
 from collision_monitor.meshes.overlap.touching_triangles import touching_triangles
 from collision_monitor.meshes.placing import relative, turned_back
 from collision_monitor.motion.bodies import place_shape
-from collision_monitor.motion.motion import rotation_now
+from collision_monitor.motion.last_state import rotation_now
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.pair_pose import PairPose
 

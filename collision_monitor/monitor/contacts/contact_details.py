@@ -32,7 +32,7 @@ from collision_monitor.meshes.distance.feature import (
 from collision_monitor.meshes.distance.triangle_pair import Corners
 from collision_monitor.meshes.extent import farthest
 from collision_monitor.motion.bodies import place_shape
-from collision_monitor.motion.motion import age_of, position_now, rotation_now
+from collision_monitor.motion.last_state import age_of, position_now, rotation_now
 from collision_monitor.narrow_phase.contact_row import (
     BOUND,
     DISTANCE,
@@ -152,8 +152,8 @@ def shape_feature_at(table: Any, s: int, x: Vector, n: Vector, reach: float, wor
 @inlined
 def origin_now(bodies: Any, i: int, now: float) -> Vector:
     """Position of body i in the world at `now` (s)."""
-    age = age_of(bodies, i, now)
-    return position_now(bodies, i, age, 0), position_now(bodies, i, age, 1), position_now(bodies, i, age, 2)
+    at: Vector = position_now(bodies, i, age_of(bodies, i, now))
+    return at
 
 
 @inlined

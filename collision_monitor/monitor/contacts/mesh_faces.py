@@ -22,7 +22,7 @@ from collision_monitor.meshes.distance.triangle_pair import Corners
 from collision_monitor.monitor.contacts.contact_details import core_point, origin_now
 from collision_monitor.monitor.state.snapshot import Snapshot, check_range
 from collision_monitor.motion.bodies import place_shape
-from collision_monitor.motion.motion import rotation_now
+from collision_monitor.motion.last_state import rotation_now
 from collision_monitor.narrow_phase.contact_row import (
     FEATURE_INDEX_A,
     FEATURE_TYPE_A,

@@ -17,7 +17,7 @@ from collision_monitor.impact.body_contact import SHAPE_I, SHAPE_J, STATUS, TOUC
 from collision_monitor.impact.mesh_pair import has_mesh
 from collision_monitor.monitor.active_pairs import Active
 from collision_monitor.motion.bodies import Multibody, next_pair, place_shape
-from collision_monitor.motion.motion import position_now, rotation_now
+from collision_monitor.motion.last_state import position_now, rotation_now
 from collision_monitor.narrow_phase.contact_row import CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.narrow_phase.manifold import CORNERS, manifold_batch, reduce_points
@@ -130,12 +130,13 @@ def _join(bodies: Any, active: Active, now: float, patches: _Patches, most: int,
         points.count[k] = m
         i, j = pairs[k].i, pairs[k].j
         there = relative_now(bodies, i, j, now)
+        at = position_now(bodies, i, there.age_i)
         out[:POINT_A] = results[k, :POINT_A]
         for c in range(m):
             for d in range(3):
                 out[POINT_A + d] = corners[c, d]
                 out[POINT_B + d] = corners[c, d] + out[DISTANCE] * out[NORMAL + d]
-                points.position[k, c, d] = corners[c, d] + position_now(bodies, i, there.age_i, d)
+                points.position[k, c, d] = corners[c, d] + at[d]
             points.closing[k, c] = closing_now(bodies, i, j, there, out)
 
 

@@ -22,7 +22,7 @@ from collision_monitor.impact.body_contact import (
     widening,
 )
 from collision_monitor.impact.body_impact import CLOSING
-from collision_monitor.motion.motion import rotation_now
+from collision_monitor.motion.last_state import rotation_now
 from collision_monitor.narrow_phase.box_box import axis_direction, sat, touching_features
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL, POINT_A
 from collision_monitor.narrow_phase.core import half_extents

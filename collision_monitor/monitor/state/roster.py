@@ -23,6 +23,7 @@ from collision_monitor.monitor.state.mesh_snapshot import mesh_arrays, plant_mes
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage, check_range
 from collision_monitor.motion.bodies import DERIVED, BodyTable, Multibody, Parts, enlarge, make_bodies, make_parts
 from collision_monitor.motion.body_layout import lay_out_body, note_plain
+from collision_monitor.motion.course import STRAIGHT
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled, monitored_model
 from collision_monitor.records import Model, ShapeType
@@ -233,6 +234,7 @@ class Roster(Stage):
             assert pose is not None
             bodies.position[i], bodies.quaternion[i] = pose.position, pose.quaternion
             bodies.linear[i] = bodies.angular[i] = bodies.acceleration[i] = 0.0
+            bodies.course[i], bodies.rest[i] = STRAIGHT, np.inf
             bodies.seen[i] = True
         elif bodies.static[i]:
             bodies.seen[i] = False  # it moves from now on, and has no state yet

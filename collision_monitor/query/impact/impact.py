@@ -60,7 +60,8 @@ def impact_of_times(times: tuple[float, float], arguments: tuple[Any, Any, Any, 
     shape_a, motion_a, shape_b, motion_b = arguments
     used = Method.CONSERVATIVE_ADVANCEMENT
     are_spheres = type(shape_a) is type(shape_b) is Sphere
-    if lower > 0.0 and are_spheres and (motion_a.acceleration == motion_b.acceleration).all():
+    are_straight = motion_a.is_straight and motion_b.is_straight
+    if lower > 0.0 and are_spheres and are_straight and (motion_a.acceleration == motion_b.acceleration).all():
         used = Method.CLOSED_FORM
     return timed_impact(lower, upper, used, arguments)
 

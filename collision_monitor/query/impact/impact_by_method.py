@@ -9,6 +9,7 @@ from typing import Final
 import numpy as np
 
 from collision_monitor.errors import InputError, UnsupportedError
+from collision_monitor.motion.stated_motion import Motion
 from collision_monitor.query.contact.contact import contact
 from collision_monitor.query.impact.impact import Impact
 from collision_monitor.query.impact.impact_methods import METHODS, bisection, end_of_step, swept_bounds
@@ -16,7 +17,7 @@ from collision_monitor.query.impact.impact_query import MotionQuery
 from collision_monitor.query.impact.moving_body import moving_body
 from collision_monitor.records import Method
 from collision_monitor.shapes.compound import Compound
-from collision_monitor.shapes.pose import Motion, Pose
+from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.reach import reach
 from collision_monitor.shapes.registry import HalfSpace, Shape
 from collision_monitor.tolerances import GJK_TOUCHING
@@ -52,8 +53,11 @@ def impact_by_method(
     motion_a, motion_b = sides[0].motion, sides[1].motion
     if any(len(side.body.shapes) > 1 or side.body.shapes[0][1].numbers != Pose().numbers for side in sides):
         raise UnsupportedError(f"method {method}: compounds are not offered; use conservative_advancement")
-    if query.separation > 0.0 or motion_a.acceleration.any() or motion_b.acceleration.any():
-        raise UnsupportedError(f"method {method}: no separation and no acceleration; use conservative_advancement")
+    motions = motion_a, motion_b
+    if query.separation > 0.0 or any(each.acceleration.any() or not each.is_straight for each in motions):
+        raise UnsupportedError(
+            f"method {method}: no separation, no acceleration and no arc; use conservative_advancement"
+        )
     if method == "swept_sat" and (motion_a.angular.any() or motion_b.angular.any()):
         raise UnsupportedError("method swept_sat: expected boxes that do not turn; use conservative_advancement")
     a, b = sides[0].body.shapes[0][0], sides[1].body.shapes[0][0]

@@ -32,10 +32,10 @@ from collision_monitor.impact.touching_impact import DEEPENS, RESTS, touching_im
 from collision_monitor.meshes.distance.nearest import PLACE_A, PLACE_B
 from collision_monitor.motion.bodies import Parts, chain_radius, next_pair
 from collision_monitor.motion.motion import MOTION, quaternion_to_matrix
+from collision_monitor.motion.stated_motion import COURSE, REST, Motion
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.query.impact.impact_query import MotionQuery
 from collision_monitor.query.library import LIBRARY, Slots
-from collision_monitor.shapes.pose import Motion
 from collision_monitor.shapes.registry import BALL
 from collision_monitor.shapes.shape_table import ShapeTable
 from collision_monitor.tolerances import GJK_TOUCHING
@@ -102,11 +102,12 @@ def _first_impact(table: Any, parts: Any, chains: Any, window: Any, search: Any,
 
 @inlined
 def set_motion(m: Any, numbers: Any, k: int) -> None:
-    """Set a motion (MOTION) to numbers[k]: pose (7), linear, angular, acceleration (3 each)."""
+    """Set a motion (MOTION) to numbers[k] (NUMBERS,) of a Motion."""
     m.x, m.y, m.z = numbers[k, 0], numbers[k, 1], numbers[k, 2]
     m.vx, m.vy, m.vz = numbers[k, 7], numbers[k, 8], numbers[k, 9]
     m.wx, m.wy, m.wz = numbers[k, 10], numbers[k, 11], numbers[k, 12]
     m.ax, m.ay, m.az = numbers[k, 13], numbers[k, 14], numbers[k, 15]
+    m.course, m.rest = int(numbers[k, COURSE]), numbers[k, REST]
     quaternion_to_matrix(numbers[:, 3:7], k, m.rotation)
 
 
@@ -117,15 +118,14 @@ def impact_of_chains(
     vertex_index: Any, local_position: Any, local_rotation: Any, blocks: Any, next_part: Any, index: Any, placed: Any,
     rotation: Any, quaternion: Any, out: Any, work: Any, tree: Any, answer: Any, triangle: Any, motion: Any,
     event: Any, row: Any, a: int, ax: float, ay: float, az: float, ai: float, aj: float, ak: float, aw: float,
-    avx: float, avy: float, avz: float, awx: float, awy: float, awz: float, aax: float, aay: float, aaz: float, b: int,
-    bx: float, by: float, bz: float, bi: float, bj: float, bk: float, bw: float, bvx: float, bvy: float, bvz: float,
-    bwx: float, bwy: float, bwz: float, bax: float, bay: float, baz: float, horizon: float, tolerance: float,
-    separation: float, iterations: int, begin: float,
+    avx: float, avy: float, avz: float, awx: float, awy: float, awz: float, aax: float, aay: float, aaz: float,
+    course_a: float, rest_a: float, b: int, bx: float, by: float, bz: float, bi: float, bj: float, bk: float, bw: float,
+    bvx: float, bvy: float, bvz: float, bwx: float, bwy: float, bwz: float, bax: float, bay: float, baz: float,
+    course_b: float, rest_b: float, horizon: float, tolerance: float, separation: float, iterations: int, begin: float,
 ) -> tuple[float, float, int]:  # fmt: skip
     """First impact of two moving chains of slots: lower, upper (s), infinite for none; DECIDED or TOUCHES.
 
-    A motion is a pose, a linear and an angular velocity and an acceleration, in the world. begin: time (s) before which
-    there is none.
+    A motion has the numbers of a pose and of a Motion. begin: time (s) before which there is none.
     """
     table = ShapeTable(
         kind, size, margin, radius, vertex_start, vertex_count, vertices, vertex_index, local_position, local_rotation,
@@ -136,6 +136,7 @@ def impact_of_chains(
     A.x, A.y, A.z, A.vx, A.vy, A.vz, A.wx, A.wy, A.wz = ax, ay, az, avx, avy, avz, awx, awy, awz
     B.x, B.y, B.z, B.vx, B.vy, B.vz, B.wx, B.wy, B.wz = bx, by, bz, bvx, bvy, bvz, bwx, bwy, bwz
     A.ax, A.ay, A.az, B.ax, B.ay, B.az = aax, aay, aaz, bax, bay, baz
+    A.course, A.rest, B.course, B.rest = int(course_a), rest_a, int(course_b), rest_b
     quaternion[0, 0], quaternion[0, 1], quaternion[0, 2], quaternion[0, 3] = ai, aj, ak, aw
     quaternion_to_matrix(quaternion, 0, A.rotation)
     quaternion[0, 0], quaternion[0, 1], quaternion[0, 2], quaternion[0, 3] = bi, bj, bk, bw
@@ -146,7 +147,7 @@ def impact_of_chains(
 
 @inlined
 def set_pair(table: Any, parts: Any, chains: Any, motion: Any, motions_a: Any, i: int, motions_b: Any, j: int) -> None:
-    """Set two motions of chains to the rows i and j of motions (N, 16), without an end."""
+    """Set two motions of chains to the rows i and j of motions (N, NUMBERS), without an end."""
     set_motion(motion[0], motions_a, i)
     set_motion(motion[1], motions_b, j)
     _set_chain(table, parts, chains[0], motion[0], inf)
@@ -160,7 +161,7 @@ def impacts_of_chains(
 ) -> None:  # fmt: skip
     """Write lower, upper (s) and code of N pairs to rows (N, 3).
 
-    firsts (N,) or (1,): slots; a negative one leaves its pair out. motions (N, 16) or (1, 16). query (4,): of
+    firsts (N,) or (1,): slots; a negative one leaves its pair out. motions (N, NUMBERS) or (1, NUMBERS). query (4,): of
     MotionQuery. moving: motions, event and row, as for one pair.
     """
     search, window = ImpactQuery(query[2], query[1], int(query[3])), Window(0.0, query[0])
@@ -178,8 +179,8 @@ def touching_chains(
 ) -> tuple[float, float]:
     """First impact of all pairs of slots of two objects that touch at the start: lower, upper (s), infinite for none.
 
-    chains: their own first slots. numbers (2, 16): their motions. slots: those of their pieces (n,) and (m,). query:
-    as above.
+    chains: their own first slots. numbers (2, NUMBERS): their motions. slots: those of their pieces (n,) and (m,).
+    query: as above.
     """
     A, B, window = motion[0], motion[1], Window(0.0, query[0])
     set_pair(table, parts, chains, motion, numbers, 0, numbers, 1)

@@ -19,11 +19,12 @@ from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.errors import UnsupportedError
 from collision_monitor.impact.body_impact import ShapePair, contact_at
 from collision_monitor.impact.sphere_interval import sphere_interval
+from collision_monitor.motion.stated_motion import Motion, straight_motions
 from collision_monitor.query.body import kept_slots
 from collision_monitor.query.impact.impact_kernel import MEMORY, impacts_of_chains, set_pair
 from collision_monitor.query.impact.impact_query import ITERATIONS
 from collision_monitor.query.library import LIBRARY
-from collision_monitor.shapes.pose import Motion, Pose
+from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Box, HalfSpace, Shape, Sphere
 from collision_monitor.tolerances import PARALLEL_SIN2
 
@@ -43,7 +44,7 @@ class MovingShapes(NamedTuple):
     library: tuple[Any, Any]  # ShapeTable and Parts
     motion: Any  # (2,) MOTION, memory
     chains: tuple[np.int32, np.int32]
-    motions_a: Array  # (N, 16): pose, linear and angular velocity, acceleration
+    motions_a: Array  # (N, NUMBERS) of a Motion
     motions_b: Array
 
 
@@ -53,8 +54,7 @@ def moving_shapes(shape_a: Shape, a: Array, shape_b: Shape, b: Array) -> MovingS
     if not all(each is not None and each.is_convex for each in kept):
         raise UnsupportedError("expected convex shapes; supported are all but compounds, concave Mesh and Polygon")
     chains = np.int32(kept[0].first), np.int32(kept[1].first)  # type: ignore[union-attr]
-    still = np.zeros((len(a), 3))
-    motions = np.concatenate([a, still], axis=1), np.concatenate([b, still], axis=1)
+    motions = straight_motions(a), straight_motions(b)
     return MovingShapes(LIBRARY.tuples, MEMORY.motion, chains, *motions)
 
 
@@ -98,9 +98,7 @@ def conservative_advancement(
     (table, parts), _, chains, motions_a, motions_b = moving_shapes(shape_a, a, shape_b, b)
     first_a, first_b = np.array(chains[:1]), np.array(chains[1:])
     query, rows = np.array([horizon, tolerance, 0.0, ITERATIONS]), np.empty((len(a), 3))
-    impacts_of_chains(
-        table, parts, MEMORY.scratch, MEMORY.moving, first_a, motions_a, first_b, motions_b, query, rows
-    )
+    impacts_of_chains(table, parts, MEMORY.scratch, MEMORY.moving, first_a, motions_a, first_b, motions_b, query, rows)
     return np.ascontiguousarray(rows[:, 0])
 
 

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import TooCostlyError, UnsupportedError
+from collision_monitor.motion.stated_motion import Motion, as_motion, flat_motion
 from collision_monitor.objects.models import containing_model
 from collision_monitor.query.body import PosedShapes, QueryBody, check_in_plane, exact_body
 from collision_monitor.query.points.near_points import near_points
 from collision_monitor.shapes.compound import Compound
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
 from collision_monitor.shapes.planar import flat_pose
-from collision_monitor.shapes.pose import Motion, Pose, as_motion
+from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.reach import reach
 from collision_monitor.shapes.registry import HalfSpace, Mesh, Points, Shape, Sphere, Triangle
 
@@ -47,9 +48,7 @@ def moving_body(shape: Compound, motion: Any, name: str) -> MovingBody:
     if any(isinstance(s, HalfSpace) for s, _ in body.shapes) and motion.angular.any():
         raise UnsupportedError(f"shape {name}: a HalfSpace has no end and cannot turn")
     if body.is_planar:
-        x, y, _ = motion.linear
-        level = (*motion.acceleration[:2], 0.0)
-        motion = Motion(flat_pose(motion.pose), (x, y, 0.0), (0.0, 0.0, motion.angular[2]), level)
+        motion = flat_motion(motion, flat_pose(motion.pose))
         check_in_plane(motion.pose)
     return MovingBody(body, motion)
 

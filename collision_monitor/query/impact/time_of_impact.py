@@ -12,6 +12,7 @@ from collision_monitor.errors import TooCostlyError
 from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.impact.mesh_pair import SURFACES
 from collision_monitor.meshes.trees.shape_trees import CERTAIN
+from collision_monitor.motion.stated_motion import Motion, as_motion
 from collision_monitor.query.body import KeptSlots, PosedShapes, QueryBody, kept_slots, laid_out
 from collision_monitor.query.contact.contact import check_kinds, contact, plant_bodies, plant_for_meshes
 from collision_monitor.query.contact.contact_kernel import contact_row
@@ -31,7 +32,6 @@ from collision_monitor.query.impact.moving_body import MovingBody, check_bounded
 from collision_monitor.records import Method
 from collision_monitor.shapes.compound import Compound
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
-from collision_monitor.shapes.pose import Motion, as_motion
 from collision_monitor.shapes.reach import reach
 from collision_monitor.shapes.registry import Mesh
 from collision_monitor.tolerances import GJK_TOUCHING
@@ -55,14 +55,15 @@ def time_of_impact(
 ) -> Impact:
     """First time in [0, horizon] (s) at which two shapes or compounds are within `separation` (m) of each other.
 
-    Both move at constant angular velocity and linear acceleration. At lower they are within `tolerance` (m) of it and
-    not before, by conservative advancement along separating directions (Mirtich, 1996; van den Bergen, 2003, 4.5) or,
-    for spheres, in closed form. `iterations`: limit of distance queries for a pair of convex pieces.
+    Both move as their Motion says: straight, along an arc, or until they stand. At lower they are within `tolerance`
+    (m) of it and not before, by conservative advancement along separating directions (Mirtich, 1996; van den Bergen,
+    2003, 4.5) or, for spheres, in closed form. `iterations`: limit of distance queries for a pair of convex pieces.
     An overlap at the start is a hit at 0. Shapes that only touch and then part, slide, roll or rest have no impact.
-    method: another way for two convex shapes without acceleration. "closed_form": spheres, or a sphere and a HalfSpace;
-    "swept_sat": boxes that do not turn; both are exact. "bisection": steps of `step` (s) until the shapes overlap, then
-    backs up and bisects; "end_of_step": the end of that step. Both may miss a contact within a step, so lower is that
-    of the bounding spheres, and the answer without an overlap is unresolved. "swept_bounds": the bounding spheres only.
+    method: another way for two convex shapes that go straight without acceleration. "closed_form": spheres, or a sphere
+    and a HalfSpace; "swept_sat": boxes that do not turn; both are exact. "bisection": steps of `step` (s) until the
+    shapes overlap, then backs up and bisects; "end_of_step": the end of that step. Both may miss a contact within a
+    step, so lower is that of the bounding spheres, and the answer without an overlap is unresolved. "swept_bounds": the
+    bounding spheres only.
     Raises InputError, ShapeError, PoseError; UnsupportedError for a plane shape with a solid one, two HalfSpaces.
 
     >>> import collision_monitor as cm

@@ -11,6 +11,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor.checks.numbers import checked_rows
 from collision_monitor.errors import PoseError
+from collision_monitor.motion.stated_motion import (
+    ACCELERATION,
+    COURSE,
+    LINEAR,
+    Frame,
+    Motion,
+    is_body_frame,
+    motion_of,
+    set_courses,
+    straight_motions,
+)
 from collision_monitor.query.batch_result import BatchResult, Pairs
 from collision_monitor.query.impact.impact import Impact, impact_of_times
 from collision_monitor.query.impact.impact_kernel import MEMORY, TOUCHES, impacts_of_chains
@@ -28,7 +39,6 @@ from collision_monitor.query.pair_arrays import (
     pose_of,
     pose_rows,
 )
-from collision_monitor.shapes.pose import Motion
 from collision_monitor.tolerances import LARGEST_INPUT
 
 Array = NDArray[np.float64]
@@ -88,13 +98,19 @@ def times_of_impact(
     separation: float = 0.0,
     iterations: int = ITERATIONS,
     progress: Progress | None = None,
+    *,
+    accelerations_a: ArrayLike | None = None,
+    accelerations_b: ArrayLike | None = None,
+    frame: Frame = "world",
+    stops: bool = False,
 ) -> Impacts:
     """`time_of_impact` for N pairs of moving shapes.
 
     shapes: one for all pairs, or a list of N; poses: (N, 7) x y z qx qy qz qw (m), a list of N, or one for all;
-    twists: (N, 6) vx vy vz wx wy wz (m/s, rad/s), or one for all. progress: called with the number of pairs that are
-    done. Convex solids take 0.2 to 5 µs a pair; compounds, open meshes, and shapes that touch at the start, 0.1 to 1
-    ms. Raises as `time_of_impact` does, and InputError if the lengths differ.
+    twists: (N, 6) vx vy vz wx wy wz (m/s, rad/s), or one for all; accelerations: (N, 3) m/s^2, or one for all; frame,
+    stops: of all motions, see `Motion`. progress: called with the number of pairs that are done. Convex solids take 0.2
+    to 5 µs a pair; compounds, open meshes, and shapes that touch at the start, 0.1 to 1 ms. Raises as `time_of_impact`
+    does, and InputError if the lengths differ.
 
     >>> import collision_monitor as cm
     >>> poses = [(x, 0, 0, 0, 0, 0, 1) for x in (2, 2.5, 9)]
@@ -107,7 +123,9 @@ def times_of_impact(
     if a.has_mesh or b.has_mesh:
         a.plant()
         b.plant()
-    s_a, s_b = _motions(poses_a, twists_a, "A"), _motions(poses_b, twists_b, "B")
+    courses = is_body_frame(frame), bool(stops)
+    s_a = _motions(poses_a, twists_a, accelerations_a, courses, "A")
+    s_b = _motions(poses_b, twists_b, accelerations_b, courses, "B")
     count = pair_count(shapes_a=len(a), motions_a=len(s_a), shapes_b=len(b), motions_b=len(s_b))
     turns_a, turns_b = (s[:, 10:13].any(axis=1) for s in (s_a, s_b))
     is_refused = (~a.is_bounded & (turns_a | ~b.is_bounded)) | (~b.is_bounded & turns_b)  # by a single query
@@ -132,11 +150,22 @@ time_of_impact_batch = times_of_impact
 """The older name."""
 
 
-def _motions(poses: Any, twists: ArrayLike, name: str) -> Array:
-    """Checked poses, twists and no acceleration side by side (N, 16)."""
+def _motions(
+    poses: Any, twists: ArrayLike, accelerations: ArrayLike | None, courses: tuple[bool, bool], name: str
+) -> Array:
+    """Checked motions (N, NUMBERS). courses: whether vectors are along the bodies' axes, and bodies stop."""
     x, v = pose_rows(poses, f"poses {name}"), checked_rows(twists, 6, f"twists {name}", LARGEST_INPUT, PoseError)
-    rows = np.zeros((pair_count(**{f"poses {name}": len(x), f"twists {name}": len(v)}), 16))
-    rows[:, :7], rows[:, 7:13] = x, v
+    a = np.zeros((1, 3))
+    if accelerations is not None:
+        a = checked_rows(accelerations, 3, f"accelerations {name}", LARGEST_INPUT, PoseError)
+    counts = {f"poses {name}": len(x), f"twists {name}": len(v), f"accelerations {name}": len(a)}
+    states = np.empty((pair_count(**counts), ACCELERATION))
+    states[:, :LINEAR], states[:, LINEAR:] = x, v
+    rows = straight_motions(states)
+    rows[:, ACCELERATION:COURSE] = a
+    along_body, stops = courses
+    if along_body or stops:
+        set_courses(rows, along_body, along_body, stops)
     return rows
 
 
@@ -146,4 +175,4 @@ def _arguments(a: BatchShapes, s_a: Array, b: BatchShapes, s_b: Array, k: int) -
 
 
 def _motion(row: Array) -> Motion:
-    return Motion(pose_of(row), row[7:10], row[10:13], row[13:16])
+    return motion_of(pose_of(row), row)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from collision_monitor import records
 from collision_monitor.codec.states import COVARIANCE_SIZE
 from collision_monitor.errors import PoseError
-from collision_monitor.records import StateFlag
-from collision_monitor.shapes.pose import Pose, from_rotation_vector, multiply, rotation_matrix
+from collision_monitor.motion.moved_states import along_body, moved_states
+from collision_monitor.shapes.pose import Pose
 from collision_monitor.sources.ground.twist_estimate import TwistEstimator
 
 Floats = NDArray[np.float64]
@@ -113,8 +113,10 @@ class WaitingStates:
         self._twists.write(states, slots, everywhere=estimated)
         has_covariance = ~np.isnan(covariance[:, 0])
         elapsed = (stamp_ns - self._stamps[slots]) * NANOSECOND
+        if self._turns[slots].any():
+            along_body(states, self._turns[slots])
         if elapsed.any():
-            _advance(states, covariance, elapsed, self._turns[slots])
+            states = _advanced(states, covariance, elapsed)
         if not has_covariance.any():
             return Step(stamp_ns, states, None)
         for row in np.flatnonzero(~has_covariance):  # beside one that has, the others need theirs
@@ -144,22 +146,10 @@ class WaitingStates:
         return slot
 
 
-def _advance(states: Any, covariance: Floats, elapsed: NDArray[Any], turns: NDArray[np.bool_]) -> None:
-    """Move states (N,) by `elapsed` (N,) s at constant acceleration and angular velocity; widen their uncertainty.
-
-    turns (N,): whether velocity and acceleration are constant along the axes of the body, and turn with it.
-    """
-    accelerates = (states["flags"] & StateFlag.ACCELERATION_VALID) != 0
-    acceleration = np.where(accelerates[:, None], states["acceleration"], 0.0)
-    time = elapsed[:, None]
-    states["position"] += (states["linear"] + 0.5 * acceleration * time) * time
-    states["linear"] += acceleration * time
-    turn = from_rotation_vector(states["angular"] * time)
-    states["quaternion"] = multiply(turn, states["quaternion"])
+def _advanced(states: Any, covariance: Floats, elapsed: NDArray[Any]) -> Any:
+    """Return states (N,) after `elapsed` (N,) s on their courses; widen their uncertainty, also that in covariance."""
+    states = moved_states(states, elapsed)
     states["position_stddev"] = np.hypot(states["position_stddev"], states["velocity_stddev"] * elapsed)
     states["orientation_stddev"] = np.hypot(states["orientation_stddev"], states["angular_velocity_stddev"] * elapsed)
-    covariance[:, :6] += covariance[:, 6:] * time**2  # of independent errors
-    if turns.any():
-        R = rotation_matrix(turn[turns])
-        for field in ("linear", "acceleration"):
-            states[field][turns] = (R @ states[field][turns][..., None])[..., 0]
+    covariance[:, :6] += covariance[:, 6:] * elapsed[:, None] ** 2  # of independent errors
+    return states

@@ -148,7 +148,7 @@ class AutowareSource(Source):
         states["position"], states["quaternion"] = poses[:, :3], poses[:, 3:]
         states["quaternion"][content.orientation[rows] == _NO_ORIENTATION] = 0.0, 0.0, 0.0, 1.0
         states["linear"], states["angular"], states["acceleration"] = twists[:, :3], twists[:, 3:], acceleration
-        states["flags"][acceleration.any(1)] = StateFlag.ACCELERATION_VALID
+        states["flags"][acceleration.any(1)] = StateFlag.ACCELERATION_VALID | StateFlag.STOPS
         covariance = self._covariances(states, content, rows, scene) if self._entry.covariance else None
         turn_twists(states)
         return states, covariance

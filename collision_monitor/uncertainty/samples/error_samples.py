@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from math import sqrt
+from math import inf, sqrt
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.geometry.vector import Vector
+from collision_monitor.geometry.vector import Vector, cross, dot
 from collision_monitor.impact.body_impact import Scratch, make_scratch
-from collision_monitor.motion.motion import MOTION
+from collision_monitor.motion.course import ARC, place_on, turned_for
+from collision_monitor.motion.motion import MOTION, place_at
 from collision_monitor.motion.trigonometry import sin_cos
 from collision_monitor.uncertainty.samples.known_axes import AXES
 from collision_monitor.uncertainty.samples.normal_samples import DIMENSIONS
@@ -127,6 +128,42 @@ def add_covariance(
 
 
 @device
+def add_arc_errors(m: Any, spread: Any, i: int, age: float, t: float, yaw_only: bool, work: Workspace) -> None:
+    """Add to work.joint how errors of orientation and angular velocity move body i, which goes along an arc m (MOTION).
+
+    An error of its orientation turns the chord of its path until t (s from now); one of its angular velocity, which
+    grows, turns half of that. Both count as errors of the velocity that are right at t, independent of how they turn
+    the body. age: s since its last state.
+    """
+    if m.course != ARC or not t > 0.0:
+        return
+    moved = place_at(m, t).moved
+    chord = (moved[0] / t, moved[1] / t, moved[2] / t)
+    pose, rate = spread.stddev[i, 1], spread.stddev[i, 3]
+    variance = pose * pose + rate * rate * (age * age + age * t + 0.25 * t * t)
+    C, frame, joint = work.block, work.frame, work.joint
+    for r in range(3):
+        for c in range(3):
+            C[r, c] = -chord[r] * chord[c] * variance
+        C[r, r] += dot(chord, chord) * variance
+    if yaw_only:  # across the chord, in the plane
+        across = (-chord[1], chord[0], 0.0)
+        for r in range(3):
+            for c in range(3):
+                C[r, c] = across[r] * across[c] * variance
+    for part in range(3):
+        row, column = 3 * (part == 2), 3 * (part > 0)
+        factor = (t * t, t, 1.0)[part]
+        for r in range(3):
+            for c in range(3):
+                total = 0.0
+                for k in range(3):
+                    for n in range(3):
+                        total += frame[r, k] * C[k, n] * frame[c, n]
+                joint[row + r, column + c] += factor * total
+
+
+@device
 def take_root(joint: Any) -> None:
     """Replace a covariance (6, 6), given by its upper triangle, by its lower Cholesky factor, with zeros above it.
 
@@ -150,10 +187,11 @@ def take_root(joint: Any) -> None:
 
 
 @device
-def turn(m: Any, R: Any, w: Vector, off: Any, error: Vector, left: Vector) -> None:
+def turn(m: Any, R: Any, w: Vector, velocity: Vector, off: Any, error: Vector, left: Vector) -> None:
     """Set rotation and angular velocity of m (MOTION) to R and w (3,), off by unit errors, see `orientation_spread`.
 
-    error, left (3,): of the orientation at the time of `off`, and of what is left.
+    velocity (3,): of a body on an arc, which turns with it. error, left (3,): of the orientation at the time of `off`,
+    and of what is left.
     """
     x, y, z = error
     u, v, q = left
@@ -172,6 +210,12 @@ def turn(m: Any, R: Any, w: Vector, off: Any, error: Vector, left: Vector) -> No
         m.rotation[0, j] = x + s * ax + c * (dy * az - dz * ay)
         m.rotation[1, j] = y + s * ay + c * (dz * ax - dx * az)
         m.rotation[2, j] = z + s * az + c * (dx * ay - dy * ax)
+    if m.course == ARC:  # its path turns with it
+        aside = cross((dx, dy, dz), velocity)
+        back = cross((dx, dy, dz), aside)
+        m.vx = velocity[0] + s * aside[0] + c * back[0]
+        m.vy = velocity[1] + s * aside[1] + c * back[1]
+        m.vz = velocity[2] + s * aside[2] + c * back[2]
 
 
 @device
@@ -217,7 +261,7 @@ def set_turn(m: Any, t: float, off: Any, yaw_only: bool, out: Any) -> None:
     if off[0] == 0.0 and off[1] == 0.0:
         return
     rate = sqrt(m.wx * m.wx + m.wy * m.wy + m.wz * m.wz)
-    angle = rate * t
+    angle = rate * turned_for(m.course, (m.vx, m.vy, m.vz), (m.ax, m.ay, m.az), t - m.time, m.rest - m.time)
     sine, cosine = sin_cos(angle)
     x, y, z = (m.wx / rate, m.wy / rate, m.wz / rate) if angle > 0.0 else (0.0, 0.0, 0.0)
     whole = 1.0
@@ -237,8 +281,11 @@ def set_turn(m: Any, t: float, off: Any, yaw_only: bool, out: Any) -> None:
 
 
 @device
-def shift(work: Workspace, z: Any, t: float, p: Vector, v: Vector) -> None:
-    """Move body j by sample z (DIMENSIONS,): its velocity is v + the error, its position p + the error at t."""
+def shift(work: Workspace, z: Any, t: float, p: Vector, v: Vector, w: Vector) -> None:
+    """Move body j by sample z (DIMENSIONS,): its velocity is v + the error, its position p + the error at t.
+
+    w: its stated angular velocity, with which the errors of a body on an arc turn.
+    """
     B, L, F, y = work.motion[1], work.joint, work.frame, work.block
     for r in range(6):
         value = 0.0
@@ -249,6 +296,9 @@ def shift(work: Workspace, z: Any, t: float, p: Vector, v: Vector) -> None:
     dy = y[1, 0] * F[0, 1] + y[1, 1] * F[1, 1] + y[1, 2] * F[2, 1]
     dz = y[1, 0] * F[0, 2] + y[1, 1] * F[1, 2] + y[1, 2] * F[2, 2]
     B.vx, B.vy, B.vz = v[0] + dx, v[1] + dy, v[2] + dz
-    B.x = p[0] + y[0, 0] * F[0, 0] + y[0, 1] * F[1, 0] + y[0, 2] * F[2, 0] - t * dx
-    B.y = p[1] + y[0, 0] * F[0, 1] + y[0, 1] * F[1, 1] + y[0, 2] * F[2, 1] - t * dy
-    B.z = p[2] + y[0, 0] * F[0, 2] + y[0, 1] * F[1, 2] + y[0, 2] * F[2, 2] - t * dz
+    mx, my, mz = t * dx, t * dy, t * dz
+    if B.course == ARC:  # the error turns with the body
+        mx, my, mz = place_on(ARC, (dx, dy, dz), w, (0.0, 0.0, 0.0), t, inf).moved
+    B.x = p[0] + y[0, 0] * F[0, 0] + y[0, 1] * F[1, 0] + y[0, 2] * F[2, 0] - mx
+    B.y = p[1] + y[0, 0] * F[0, 1] + y[0, 1] * F[1, 1] + y[0, 2] * F[2, 1] - my
+    B.z = p[2] + y[0, 0] * F[0, 2] + y[0, 1] * F[1, 2] + y[0, 2] * F[2, 2] - mz

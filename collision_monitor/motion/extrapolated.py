@@ -1,0 +1,53 @@
+"""Where many bodies are now, extrapolated from their last states, as arrays."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor._jit import kernel
+from collision_monitor.motion.bodies import BodyTable
+from collision_monitor.motion.course import STRAIGHT
+from collision_monitor.motion.last_state import age_of, bending_now, position_now, twist_now, velocity_now
+
+Array = NDArray[np.float64]
+
+
+class Extrapolated(NamedTuple):
+    """N bodies at a time; world frame."""
+
+    age: Array  # (N,): s since the last state; 0 for a static one
+    position: Array  # (N, 3): m
+    velocity: Array  # (N, 3): m/s
+    angular: Array  # (N, 3): rad/s
+    acceleration: Array  # (N, 3): constant from now on (m/s^2); 0 for a body that bends
+    bending: Array  # (N,): bound on the acceleration of a body that brakes or goes along an arc, for `ahead`; else 0
+
+
+def extrapolated(bodies: BodyTable, slots: NDArray[np.integer[Any]], now: float, ahead: float = 0.0) -> Extrapolated:
+    """Extrapolate the bodies in some slots (N,) to `now` (s). ahead: s from then on, for `bending`."""
+    n = len(slots)
+    found = Extrapolated(
+        np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
+    )  # fmt: skip
+    _extrapolate(bodies, np.asarray(slots, np.int64), now, ahead, found)
+    return found
+
+
+@kernel
+def _extrapolate(bodies: BodyTable, slots: Any, now: float, ahead: float, found: Extrapolated) -> None:
+    for k in range(slots.size):
+        i = slots[k]
+        age = age_of(bodies, i, now)
+        found.age[k] = age
+        p, v = position_now(bodies, i, age), velocity_now(bodies, i, age)
+        is_straight = bodies.course[i] == STRAIGHT
+        w = (bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2])
+        if not is_straight:
+            w = twist_now(bodies, i, age).angular
+        for c in range(3):
+            found.position[k, c], found.velocity[k, c], found.angular[k, c] = p[c], v[c], w[c]
+            found.acceleration[k, c] = bodies.acceleration[i, c] if is_straight else 0.0
+        found.bending[k] = 0.0 if is_straight else bending_now(bodies, i, age, ahead)

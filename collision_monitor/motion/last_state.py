@@ -1,0 +1,165 @@
+"""Where a body is now: its last state, extrapolated along its course."""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Any
+
+from collision_monitor._jit import device, inlined
+from collision_monitor.geometry.vector import Vector, minus, scaled
+from collision_monitor.motion.course import STRAIGHT, Place, most_acceleration, place_on, turned_for
+from collision_monitor.motion.motion import Twist, quaternion_to_matrix, turn_quaternion, twist_on
+
+
+@inlined
+def age_of(bodies: Any, i: int, now: float) -> float:
+    """Seconds since the last state of body i; 0 for a static one."""
+    return 0.0 if bodies.static[i] else now - bodies.time[i]
+
+
+@inlined
+def place_now(bodies: Any, i: int, age: float) -> Place:
+    """Where body i is `age` seconds after its last state, relative to it."""
+    v = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
+    w = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
+    a = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]
+    return place_on(bodies.course[i], v, w, a, age, bodies.rest[i])
+
+
+@inlined
+def position_now(bodies: Any, i: int, age: float) -> Vector:
+    """Position of body i's origin `age` seconds after its last state (m)."""
+    p, v, a = bodies.position, bodies.linear, bodies.acceleration
+    if bodies.course[i] != STRAIGHT:
+        moved = place_now(bodies, i, age).moved
+        return p[i, 0] + moved[0], p[i, 1] + moved[1], p[i, 2] + moved[2]
+    return (
+        p[i, 0] + (v[i, 0] * age + 0.5 * a[i, 0] * age * age),
+        p[i, 1] + (v[i, 1] * age + 0.5 * a[i, 1] * age * age),
+        p[i, 2] + (v[i, 2] * age + 0.5 * a[i, 2] * age * age),
+    )
+
+
+@inlined
+def velocity_now(bodies: Any, i: int, age: float) -> Vector:
+    """Velocity of body i's origin `age` seconds after its last state (m/s)."""
+    if bodies.course[i] != STRAIGHT:
+        velocity: Vector = place_now(bodies, i, age).velocity
+        return velocity
+    v, a = bodies.linear, bodies.acceleration
+    return v[i, 0] + a[i, 0] * age, v[i, 1] + a[i, 1] * age, v[i, 2] + a[i, 2] * age
+
+
+@inlined
+def angular_now(bodies: Any, i: int, age: float) -> Vector:
+    """Angular velocity of body i `age` seconds after its last state (rad/s)."""
+    w, rate = bodies.angular, 1.0
+    if bodies.course[i] != STRAIGHT:
+        rate = place_now(bodies, i, age).rate
+    return rate * w[i, 0], rate * w[i, 1], rate * w[i, 2]
+
+
+@inlined
+def bending_now(bodies: Any, i: int, age: float, ahead: float) -> float:
+    """Bound on the acceleration (m/s^2) of body i's origin in `ahead` s, from `age` s after its last state on."""
+    v = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
+    w = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
+    a = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]
+    return most_acceleration(bodies.course[i], v, w, a, age, age + ahead, bodies.rest[i])
+
+
+@inlined
+def _coordinate(bodies: Any, i: int, age_i: float, j: int, age_j: float, c: int) -> float:
+    moved = bodies.linear[j, c] * age_j - bodies.linear[i, c] * age_i
+    bent = 0.5 * bodies.acceleration[j, c] * age_j * age_j - 0.5 * bodies.acceleration[i, c] * age_i * age_i
+    return bodies.position[j, c] - bodies.position[i, c] + (moved + bent)
+
+
+@inlined
+def relative_position_now(bodies: Any, i: int, age_i: float, j: int, age_j: float) -> Vector:
+    """Position of body j's origin relative to body i's (m), each extrapolated by the age (s) of its last state."""
+    if bodies.course[i] != STRAIGHT or bodies.course[j] != STRAIGHT:
+        one, other = place_now(bodies, i, age_i).moved, place_now(bodies, j, age_j).moved
+        p = bodies.position
+        return (
+            p[j, 0] - p[i, 0] + (other[0] - one[0]),
+            p[j, 1] - p[i, 1] + (other[1] - one[1]),
+            p[j, 2] - p[i, 2] + (other[2] - one[2]),
+        )
+    return (
+        _coordinate(bodies, i, age_i, j, age_j, 0),
+        _coordinate(bodies, i, age_i, j, age_j, 1),
+        _coordinate(bodies, i, age_i, j, age_j, 2),
+    )
+
+
+@inlined
+def relative_velocity_now(bodies: Any, i: int, age_i: float, j: int, age_j: float) -> Vector:
+    """Velocity of body j's origin relative to body i's (m/s)."""
+    if bodies.course[i] != STRAIGHT or bodies.course[j] != STRAIGHT:
+        return minus(place_now(bodies, j, age_j).velocity, place_now(bodies, i, age_i).velocity)
+    v, a = bodies.linear, bodies.acceleration
+    return (
+        v[j, 0] - v[i, 0] + (a[j, 0] * age_j - a[i, 0] * age_i),
+        v[j, 1] - v[i, 1] + (a[j, 1] * age_j - a[i, 1] * age_i),
+        v[j, 2] - v[i, 2] + (a[j, 2] * age_j - a[i, 2] * age_i),
+    )
+
+
+@inlined
+def twist_now(bodies: Any, i: int, age: float) -> Twist:
+    """How body i moves `age` seconds after its last state."""
+    v = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
+    w = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
+    a = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]
+    return twist_on(bodies.course[i], v, w, a, age, bodies.rest[i])
+
+
+@inlined
+def quaternion_now(bodies: Any, i: int, age: float, out: Any) -> None:
+    """Write the orientation of body i `age` seconds after its last state into out (4,)."""
+    wx, wy, wz = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
+    if bodies.course[i] != STRAIGHT:
+        v = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
+        a = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]
+        age = turned_for(bodies.course[i], v, a, age, bodies.rest[i])
+    turn_quaternion(bodies.quaternion, i, wx, wy, wz, age, out)
+
+
+@device
+def rotation_now(bodies: Any, i: int, now: float, q: Any, R: Any) -> None:
+    """Write the rotation of body i at `now`, extrapolated from its last state, into R (3, 3); q (1, 4): scratch."""
+    quaternion_now(bodies, i, age_of(bodies, i, now), q[0])
+    quaternion_to_matrix(q, 0, R)
+
+
+@device
+def carry_on(bodies: Any, i: int, now: float, q: Any, m: Any) -> float:
+    """Write body i's last state, extrapolated to `now`, as the motion m (MOTION) with time 0 = now. Return its age."""
+    age = 0.0 if bodies.static[i] else now - bodies.time[i]
+    set_reference(bodies, i, age, 0.0, q, 0, m)
+    m.radius = bodies.motion[i].radius
+    return age
+
+
+@inlined
+def set_reference(bodies: Any, i: int, age: float, time: float, q: Any, k: int, m: Any) -> None:
+    """Make body i's course, from `age` seconds after its last state on, the motion m (MOTION) from `time` on.
+
+    q[k] (4,), written: its orientation then.
+    """
+    m.course, m.rest, m.time = bodies.course[i], inf, time
+    m.x, m.y, m.z = position_now(bodies, i, age)
+    quaternion_now(bodies, i, age, q[k])
+    quaternion_to_matrix(q, k, m.rotation)
+    if m.course == STRAIGHT:
+        m.vx, m.vy, m.vz = velocity_now(bodies, i, age)
+        m.wx, m.wy, m.wz = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
+        m.ax, m.ay, m.az = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]
+        return
+    there, m.rest = twist_now(bodies, i, age), time + (bodies.rest[i] - age)
+    m.vx, m.vy, m.vz = there.velocity
+    m.wx, m.wy, m.wz = there.angular
+    m.ax, m.ay, m.az = scaled(there.velocity, there.change)
+    if m.rest <= time:
+        m.course, m.rest = STRAIGHT, inf
