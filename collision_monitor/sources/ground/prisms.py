@@ -55,9 +55,9 @@ def covering_prism(corners: Floats, low: float, high: float) -> tuple[Parts, str
     """
     finite = (np.abs(corners) <= LARGEST_INPUT).all(1)
     if not finite.any():
-        raise ShapeError(f"footprint: expected at least 3 finite corners, got {int(finite.sum())}")
+        raise ShapeError("footprint: expected at least 3 finite corners, got 0")
     ring = _distinct(corners[finite])
-    reason = f"footprint: expected at least 3 finite corners, got {int(finite.sum())}"
+    reason = f"footprint: expected at least 3 corners, all finite, got {int(finite.sum())} finite of {len(corners)}"
     if finite.all() and len(ring) >= 3:
         try:
             return prism(ring, low, high), ""
