@@ -33,22 +33,37 @@ def real_array(value: Any) -> Array:
     """
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value
-    parts = value if isinstance(value, list | tuple) else (value,)
-    if any(map(hides_some, parts)):
+    if hides_some(value):
         raise TypeError("numbers are masked")
     array = np.asarray(value)
-    if array.dtype.kind == "O" and not any(isinstance(each, str | bytes | complex) for each in array.flat):
+    if array.dtype.kind == "O" and all(map(_is_like_a_number, array.flat)):
         return array.astype(np.float64)  # Fraction, Decimal and the like
     if array.dtype.kind not in _NUMBERS:
         raise TypeError(f"expected numbers, got {array.dtype}")
-    return np.asarray(array, np.float64)
+    with np.errstate(over="ignore"):  # a number beyond float64 becomes infinite
+        return np.asarray(array, np.float64)
+
+
+def _is_like_a_number(value: Any) -> bool:
+    """Whether an object may be a number: no text, no complex number, and no time, which NumPy would convert too."""
+    if isinstance(value, np.generic):
+        return value.dtype.kind in _NUMBERS
+    return not isinstance(value, str | bytes | complex)
 
 
 def hides_some(value: Any) -> bool:
-    """Whether a value is a masked array that hides some of its elements."""
-    if not isinstance(value, np.ma.MaskedArray):
+    """Whether a value is a masked array that hides some of its elements, or a list of such, of lists too."""
+    if isinstance(value, np.ma.MaskedArray):
+        return bool(np.ascontiguousarray(np.ma.getmaskarray(value)).view(np.bool_).any())
+    if not isinstance(value, list | tuple) or not value:
         return False
-    return bool(np.ascontiguousarray(np.ma.getmaskarray(value)).view(np.bool_).any())
+    if isinstance(value[0], list | tuple):  # rows of plain numbers are most of what comes
+        return any(hides_some(row) for row in value if row is not value and not _begins_plainly(row))
+    return any(isinstance(each, np.ma.MaskedArray) and hides_some(each) for each in value)
+
+
+def _begins_plainly(row: Any) -> bool:
+    return isinstance(row, list | tuple) and len(row) > 0 and type(row[0]) in (float, int)
 
 
 def real_number(value: Any) -> float:
@@ -75,7 +90,8 @@ def checked_number(
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if not (math.isfinite(number) and least <= number <= most and not (above and number == least)):
-        raise error(f"{what}: expected {_wanted(unit, least, most, above)}, got {value!r:.100}")
+        shown = value.item() if isinstance(value, np.generic) else value  # `nan` in place of `np.float64(nan)`
+        raise error(f"{what}: expected {_wanted(unit, least, most, above)}, got {shown!r:.100}")
     return number
 
 

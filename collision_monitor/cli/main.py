@@ -82,7 +82,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         given = sys.argv[1:] if arguments is None else arguments
         _check_empty(given)
-        args = make_parser().parse_args(given)
+        try:
+            args = make_parser().parse_args(given)
+        except SystemExit:  # --help, --version
+            sys.stdout.flush()
+            raise
         command: Callable[[argparse.Namespace], int] = args.command
         code = command(args)
         sys.stdout.flush()

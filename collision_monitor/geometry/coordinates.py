@@ -41,12 +41,12 @@ def triangles(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> tupl
     """A triangle mesh: vertices (n, 3), faces (m, 3) of vertex indices, m >= 1. Raises ShapeError."""
     points = point_set(vertices, f"{what} vertices", 3, least=3)
     try:
-        indices = np.asarray(faces)
         if hides_some(faces):
             raise TypeError
+        indices = np.asarray(faces)
     except (TypeError, ValueError, OverflowError):
         raise ShapeError(f"{what} faces: expected integers of shape (m, 3), got {type(faces).__name__}") from None
-    if indices.ndim != 2 or indices.shape[1] != 3 or len(indices) == 0 or not np.issubdtype(indices.dtype, np.integer):
+    if indices.ndim != 2 or indices.shape[1] != 3 or len(indices) == 0 or indices.dtype.kind not in "iu":
         got = f"{indices.dtype} {indices.shape}"
         raise ShapeError(f"{what} faces: expected integers of shape (m, 3), m >= 1, got {got}")
     if indices.min() < 0 or indices.max() >= len(points):

@@ -52,7 +52,7 @@ class Contacts(NamedTuple):
         Raises InputError.
         """
         index = np.asarray(pairs)
-        if index.ndim != 2 or index.shape[1] != 2 or not np.issubdtype(index.dtype, np.integer):
+        if index.ndim != 2 or index.shape[1] != 2 or index.dtype.kind not in "iu":
             raise InputError(f"pairs: expected whole numbers of shape (M, 2), got {index.dtype} {index.shape}")
         if (index[:, 0] == index[:, 1]).any():
             raise InputError("pairs: expected two different bodies, got a body in contact with itself")

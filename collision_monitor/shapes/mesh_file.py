@@ -93,7 +93,8 @@ def _read(file: Path) -> RawMesh:
     if not data:
         raise ShapeError(f"{file}: expected a mesh in {kind.upper()} format, got an empty file")
     try:
-        mesh = READERS[kind](data)
+        with np.errstate(all="ignore"):  # numbers that are none: they are refused below
+            mesh = READERS[kind](data)
     except ShapeError as error:
         raise ShapeError(f"{file}: expected a mesh in {kind.upper()} format: {error}") from None
     except Exception as error:  # a description of other types than those of its format, such as a text as an index

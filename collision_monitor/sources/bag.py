@@ -162,8 +162,8 @@ class Bag:
             for each in channels:
                 if each.stated not in (None, each.count):
                     raise SessionError(
-                        f"{self.path}: expected {each.stated} messages of {topic}, as the file's summary states, got "
-                        f"{each.count}{_hint(self._storages)}"
+                        f"{self.path}: expected {each.stated} messages of {topic}, as the file's {each.stated_by} "
+                        f"states, got {each.count}{_hint(self._storages)}"
                     )
             stated = self._counts.get(topic, there)
             if stated != there:

@@ -40,7 +40,7 @@ URDF: Final = """<robot name="r"><link name="a"><collision><geometry><box size="
 <link name="b"><collision><geometry>{}</geometry></collision></link></robot>"""
 GEOMETRIES: Final = (
     *('<sphere radius="0.2"/>', '<mesh filename="part.stl"/>', f'<mesh filename="{"n" * 300}.stl"/>', "<cone/>"),
-    *('<mesh filename="/root/x/y.stl"/>', '<mesh filename="package://a/b.stl"/>', '<box size="0 0 0"/>'),
+    *('<mesh filename="/nowhere/x/y.stl"/>', '<mesh filename="package://a/b.stl"/>', '<box size="0 0 0"/>'),
 )
 
 Typed = tuple[str, Any]

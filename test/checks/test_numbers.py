@@ -72,6 +72,17 @@ def test_a_file_holds_a_number_only_where_it_is_one(value: Any) -> None:
         checked_yaml_number(value, "it", "m", error=ProfileError)
 
 
+@pytest.mark.parametrize("value", [np.float64(math.nan), np.float32(math.inf), np.int64(-1)])
+def test_numbers_of_numpy_are_shown_as_numbers(value: Any) -> None:
+    with pytest.raises(InputError, match=r"got (nan|inf|-1)$"):
+        checked_number(value, "it", least=0.0)
+
+
+def test_a_number_beyond_float64_is_infinite_without_a_warning(recwarn: pytest.WarningsRecorder) -> None:
+    assert as_numbers([np.longdouble("1e4000"), 1], "it").tolist() in ([math.inf, 1.0], [1e308, 1.0])
+    assert not recwarn.list
+
+
 @pytest.mark.parametrize("value", [0, -1, 2.0, "2", None, math.nan], ids=repr)
 def test_whole_numbers_begin_with_one(value: Any) -> None:
     assert (checked_whole(np.int16(3), "n"), checked_whole(10**30, "n")) == (3, MOST_WHOLE)
@@ -79,7 +90,16 @@ def test_whole_numbers_begin_with_one(value: Any) -> None:
         checked_whole(value, "n")
 
 
-@pytest.mark.parametrize("value", ["here", [[1], [1, 2]], [10**400], [None, "x"], ...], ids=repr)
+MASKED = np.ma.array([1.0, 2.0, 3.0], mask=[False, True, False])
+WITHOUT_A_VALUE = [
+    *("here", [[1], [1, 2]], [10**400], [None, "x"], ...),
+    *(np.array([np.complex64(1 + 2j), 2, 3], object), [np.timedelta64(1, "s")] * 3),
+    *(np.array([np.timedelta64(1, "s")] * 3, object), np.array([1, 2, 3], "m8[s]"), np.array([1, 2, 3], "M8[s]")),
+    *(MASKED, [MASKED, MASKED], [[MASKED, MASKED]], [list(MASKED)], [[[MASKED]]]),
+]
+
+
+@pytest.mark.parametrize("value", WITHOUT_A_VALUE, ids=repr)
 def test_what_is_no_array_of_numbers_is_refused(value: Any) -> None:
     for check in (as_numbers, checked_array, lambda value, what: checked_rows(value, 3, what, 1.0)):
         with pytest.raises(InputError, match=r"^x: expected numbers"):

@@ -120,6 +120,17 @@ def test_a_terminal_of_another_encoding_gets_question_marks(encoding: str) -> No
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="this system has no /dev/full")
+@pytest.mark.parametrize("arguments", ["--version", "--help", "import --help"])
+def test_a_full_disk_behind_a_help_is_an_error_in_one_line(arguments: str) -> None:
+    buffered = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    with open("/dev/full", "w") as full:
+        answer = subprocess.run(
+            [PROGRAM, *arguments.split()], stdout=full, stderr=subprocess.PIPE, text=True, timeout=60, env=buffered
+        )
+    assert (answer.returncode, answer.stderr) == (1, "collision-monitor: error: No space left on device\n")
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/full"), reason="this system has no /dev/full")
 def test_a_full_disk_behind_stdout_is_one_line() -> None:
     with open("/dev/full", "w") as full:
         command = [PROGRAM, "world", "--list"]

@@ -12,6 +12,7 @@ import pytest
 from fed import Fed
 from foreign_bag import SECOND, START, STORE, T, marker, markers, odometry, pose_stamped, transforms
 from foreign_messages import (
+    CYLINDER,
     POLYGON,
     detection,
     detections,
@@ -325,6 +326,45 @@ def test_a_ring_that_is_no_polygon_is_monitored_by_what_contains_it(ring: str, h
     polygon = [(*corner, 0.0) for corner in corners]
     tracks.give("/t", START, tracked_objects("map", START, track(1, (0, 0, 0), kind=POLYGON, footprint=polygon)))
     assert len(tracks.rows) == 1 and contains(tracks, finite, 1.5)
+
+
+@pytest.mark.parametrize("heights", [(0, 0, 1, 1), (0, 0.5, 0.5, 0), (0, 5, -5, 0)])
+def test_corners_of_different_heights_are_monitored_by_a_prism_over_all_of_them(heights: Any) -> None:
+    flat, high = [(0, 0), (1, 0), (1, 1), (0, 1)], 0.5
+    fed = Fed({"it": {"topic": "/t", "height": high}}, begin=START)
+    kind, content = footprint("map", START, flat)
+    for corner, z in zip(content.polygon.points, heights, strict=True):
+        corner.z = float(z)
+    for k in range(3):
+        content.header.stamp.nanosec = k
+        fed.give("/t", START + k, (kind, content))
+    (description,) = fed.changes  # once, and not with every message
+    assert isinstance(description, ObjectDescription)
+    z = np.concatenate([shape.points[:, 2] for shape, _ in description.shapes]) + fed.rows["position"][0, 2]
+    np.testing.assert_allclose([z.min(), z.max()], [min(heights), max(heights) + high], atol=1e-6)
+    (text,) = fed.refused
+    assert "expected corners of one height" in text and text.endswith("a prism over all of them is monitored")
+    fed.give("/t", START + 3, footprint("map", START + 3, flat))
+    last = fed.changes[-1]
+    assert len(fed.changes) == 2 and isinstance(last, ObjectDescription)
+    assert np.ptp(last.shapes[0][0].points[:, 2]) == high  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize("size", [(NAN, 1, 1), (1, NAN, 1), (-1, 1, 1), (1, -1, 1)])
+def test_a_diameter_that_is_none_is_refused_in_any_order(size: Any) -> None:
+    fed = Fed({"it": {"topic": "/t"}})
+    bad = track(1, (0, 0, 0), kind=CYLINDER, size=size)
+    fed.give("/t", START, tracked_objects("map", START, bad, track(2, (5, 0, 0), kind=CYLINDER)))
+    assert fed.names == ["it_car_2"] and [row.what for row in fed.feed.unmonitored] == ["it_car_1"]
+    turned = track(1, (0, 0, 0), size=size, orientation=0)  # a box that is turned in a way that is not known
+    fed = Fed({"it": {"topic": "/t"}})
+    fed.give("/t", START, tracked_objects("map", START, turned, track(2, (5, 0, 0))))
+    assert fed.names == ["it_car_2"]
+    lying = detection((0, 0, 0), size, name="a")
+    lying.bbox.center.orientation.w = 0.0  # turned in a way that is not known
+    fed = Fed({"it": {"topic": "/t"}})
+    fed.give("/t", START, detections("map", START, lying, detection((5, 0, 0), name="b")))
+    assert fed.names == ["it_person_b"] and [row.what for row in fed.feed.unmonitored] == ["it_person_a"]
 
 
 def contains(fed: Fed, corners: Any, height: float) -> bool:

@@ -90,6 +90,60 @@ def test_a_chunk_that_is_missing_is_an_error_with_both_numbers(tmp_path: Path) -
     assert not target.exists()
 
 
+@pytest.mark.parametrize("number", [1, 12])
+def test_a_file_without_statistics_is_compared_with_the_indexes_of_its_chunks(tmp_path: Path, number: int) -> None:
+    path = tmp_path / "bag.mcap"
+    whole = mutations.parse(mcap(path, rows(), chunk_size=2000, use_statistics=False).read_bytes(), len(MAGIC))
+    chunk = [k for k, each in enumerate(whole) if each.opcode == Opcode.CHUNK][number]
+    inner = mutations.parse(mutations.unpack_chunk(whole[chunk]))
+    kept = [each for each in inner if each.opcode != Opcode.MESSAGE] + [inner[-1]]
+    smaller = [*whole[:chunk], mutations.make_chunk(mutations.join(kept)), *whole[chunk + 1 :]]
+    lost = len(inner) - len(kept)
+    path.write_bytes(with_summary(smaller))
+    with pytest.raises(
+        SessionError, match=f"expected 40 messages of /odom, as the file's index states, got {40 - lost};"
+    ):
+        read(path)
+    gone = [*whole[:chunk], *whole[chunk + 2 :]]  # with the index behind it; the summary's is there
+    path.write_bytes(with_summary(gone))
+    with pytest.raises(SessionError, match="its summary states 14 chunks, there are 13"):
+        read(path)
+    half = whole[:chunk] + whole[chunk + 1 :]  # no index in the summary, but that of its messages is there
+    path.write_bytes(with_summary([each for each in half if each.opcode != Opcode.CHUNK_INDEX]))
+    with pytest.raises(SessionError, match="expected 40 messages of /odom, as the file's index states, got 37;"):
+        read(path)
+    without_any = [each for each in whole if each.opcode not in (Opcode.CHUNK_INDEX, Opcode.MESSAGE_INDEX)]
+    path.write_bytes(with_summary(without_any))
+    assert read(path) == rows()
+
+
+def test_statistics_of_a_channel_that_is_lost_with_its_messages(tmp_path: Path) -> None:
+    """Two channels of one topic: of the second one, only the number of its messages is left."""
+    path = tmp_path / "bag.mcap"
+    with path.open("wb") as stream:
+        writer = McapWriter(stream, repeat_channels=False)
+        writer.start("ros2", "another program")
+        schema = writer.register_schema("nav_msgs/msg/Odometry", "ros2msg", b"")
+        for half, known in ((rows()[:20], {}), (rows()[20:], {"of": "another publisher"})):
+            channel = writer.register_channel(ODOM, "cdr", schema, known)
+            for _, time, data in half:
+                writer.add_message(channel, time, data, time, 0)
+        writer.finish()
+    assert len(read(path)) == 40
+    records = mutations.parse(path.read_bytes(), len(MAGIC))
+    (chunk,) = (each for each in records if each.opcode == Opcode.CHUNK)
+    second = (2).to_bytes(2, "little")
+    inner = [
+        each
+        for each in mutations.parse(mutations.unpack_chunk(chunk))
+        if not (each.opcode in (Opcode.CHANNEL, Opcode.MESSAGE) and each.content[:2] == second)
+    ]
+    chunk.content = mutations.make_chunk(mutations.join(inner)).content
+    path.write_bytes(with_summary(records))
+    with pytest.raises(SessionError, match="its summary states 20 messages of channels that are not there"):
+        read(path)
+
+
 @pytest.mark.parametrize("chunked", [True, False])
 @pytest.mark.parametrize("offset", ["kept", "none"])
 def test_the_summary_counts_wherever_the_end_says_that_it_is(tmp_path: Path, chunked: bool, offset: str) -> None:

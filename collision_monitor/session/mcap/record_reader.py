@@ -92,7 +92,7 @@ class McapReader:
         """Yield the same. begin: offset of a record; the records from the first message up to it are skipped."""
         count = 0
         with self.opened() as file:
-            for start, found_records in self._sections(file):
+            for start, _, found_records in self._sections(file):
                 for record in found_records:
                     if isinstance(record, Message):
                         if start < begin:
@@ -103,8 +103,8 @@ class McapReader:
         if self.position == self.size and not (begin or self.damage):
             self._compare(count)
 
-    def sections(self) -> Iterator[tuple[int, Iterable[Any]]]:
-        """Yield the offset of each record in the file, with the records that it holds: those of a chunk, or itself."""
+    def sections(self) -> Iterator[tuple[int, int, Iterable[Any]]]:
+        """Yield offset and opcode of each record in the file, and the records that it holds: of a chunk, or itself."""
         with self.opened() as file:
             yield from self._sections(file)
 
@@ -120,7 +120,7 @@ class McapReader:
         except Exception as error:  # as above
             raise SessionError(f"{self.path}: expected the bytes of before, got others: {error}") from None
 
-    def _sections(self, file: BinaryIO) -> Iterator[tuple[int, Iterable[Any]]]:
+    def _sections(self, file: BinaryIO) -> Iterator[tuple[int, int, Iterable[Any]]]:
         for start, opcode, length in self._heads(file):
             limit = _LARGEST.get(opcode, 0)
             if not 0 < length <= limit:
@@ -136,7 +136,7 @@ class McapReader:
                 reason = str(error) or repr(error)
                 self._note(f"{_name(opcode)} of {length} bytes at byte {start} is damaged: {reason}")
                 continue
-            yield start, found_records
+            yield start, opcode, found_records
 
     def glance(self) -> Iterator[tuple[int, int, bytes]]:
         """Yield offset, opcode and first bytes of each record in the file, without unpacking it."""
@@ -148,6 +148,8 @@ class McapReader:
 
     def summary(self) -> Iterator[tuple[int, bytes]]:
         """Yield kind and content of the schemas, channels and statistics in the summary; nothing if there is none.
+
+        Of the index of a chunk, only that it is there.
 
         The summary is all that follows the end of the data, where the last reading came to it. Raises ValueError if the
         file does not end like an MCAP file, if messages follow the end of the data, or if the summary is too large.
@@ -170,6 +172,8 @@ class McapReader:
                     if room < 0:
                         raise ValueError(f"its summary is larger than {_LARGEST_SUMMARY} bytes")
                     yield opcode, file.read(length)
+                elif opcode == Opcode.CHUNK_INDEX:
+                    yield opcode, b""
                 at += HEAD.size + length
             if at != footer:
                 raise ValueError("its summary does not lead to its end")

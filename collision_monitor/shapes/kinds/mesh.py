@@ -43,13 +43,13 @@ class Mesh(Shape):
     def __post_init__(self) -> None:
         vertices = point_rows(self.vertices, "Mesh vertices", 3, 3)
         try:
-            faces = np.array(self.faces)
             if hides_some(self.faces):
                 raise TypeError
+            faces = np.array(self.faces)
         except (TypeError, ValueError, OverflowError):
             got = type(self.faces).__name__
             raise ShapeError(f"Mesh faces: expected an array of shape (m, 3), got {got}") from None
-        if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0 or not np.issubdtype(faces.dtype, np.integer):
+        if faces.ndim != 2 or faces.shape[1] != 3 or len(faces) == 0 or faces.dtype.kind not in "iu":
             raise ShapeError(f"Mesh faces: expected integers of shape (m, 3), m >= 1, got {faces.dtype} {faces.shape}")
         if faces.min() < 0 or faces.max() >= len(vertices):
             raise ShapeError(

@@ -83,6 +83,14 @@ def _chunks(data: bytes) -> tuple[dict[str, Any], bytes]:
     return content, found.get(b"BIN\0", b"")
 
 
+def _at(found: Any, number: Any, what: str) -> Any:
+    """Return an element of a list of the file by its number. Raises ShapeError; Python would count -1 from the end."""
+    if not (isinstance(number, int) and isinstance(found, list) and 0 <= number < len(found)):
+        there = f"of {len(found)}" if isinstance(found, list) else "of none"
+        raise ShapeError(f"expected the number of one {there} {what}, got {number!r:.80}")
+    return found[number]
+
+
 class _Scene:
     """The tree of a file's nodes, and its meshes."""
 
@@ -100,7 +108,7 @@ class _Scene:
             for number in range(len(self._content.get("meshes", []))):
                 self._place(number, np.eye(4))
         elif scenes:
-            self._walk(scenes[self._content.get("scene", 0)].get("nodes", []))
+            self._walk(_at(scenes, self._content.get("scene", 0), "scenes").get("nodes", []))
         else:
             below = {child for node in nodes for child in node.get("children", ())}
             self._walk([number for number in range(len(nodes)) if number not in below])
@@ -116,7 +124,7 @@ class _Scene:
             if number in seen:
                 raise ShapeError(f"expected a tree of nodes, got node {number} at two places")
             seen.add(number)
-            node = nodes[number]
+            node = _at(nodes, number, "nodes")
             X_SN = X_SP @ _pose_of(node)
             if _INSTANCES in node.get("extensions", {}):
                 raise ShapeError(f"node {number}: expected a plain node, got the extension {_INSTANCES}")
@@ -135,7 +143,7 @@ class _Scene:
 
     def _primitives(self, number: int) -> Iterator[tuple[Array, Indices]]:
         """Yield the parts of a mesh."""
-        mesh = self._content["meshes"][number]
+        mesh = _at(self._content.get("meshes"), number, "meshes")
         weights = mesh.get("weights", ())
         for primitive in mesh["primitives"]:
             mode = primitive.get("mode", _TRIANGLES)
@@ -161,7 +169,7 @@ class _Scene:
 
     def _read_array(self, number: int) -> NDArray[Any]:
         """Return the values (n, width) of an accessor, with those that are changed one by one (sparse)."""
-        accessor = self._content["accessors"][number]
+        accessor = _at(self._content.get("accessors"), number, "accessors")
         kind, width, count = (
             np.dtype("<" + _TYPES[accessor["componentType"]]),
             _WIDTHS[accessor["type"]],
@@ -181,6 +189,8 @@ class _Scene:
             where, what, changed = sparse["indices"], sparse["values"], sparse["count"]
             index = np.dtype("<" + _TYPES[where["componentType"]])
             rows = self._values(where["bufferView"], where.get("byteOffset", 0), index, changed, 1).reshape(-1)
+            if len(rows) and not (rows.min() >= 0 and rows.max() < count):
+                raise ShapeError(f"accessor {number}: expected changes of its {count} values, got one of {rows.max()}")
             values[rows] = self._values(what["bufferView"], what.get("byteOffset", 0), kind, changed, width)
         if accessor.get("normalized") and kind.kind != "f":
             scaled = values / float(np.iinfo(kind).max)
@@ -189,7 +199,7 @@ class _Scene:
 
     def _values(self, view: int, offset: int, kind: np.dtype[Any], count: int, width: int) -> NDArray[Any]:
         """Return numbers (count, width) of a view of a buffer, from a byte offset on."""
-        found = self._content["bufferViews"][view]
+        found = _at(self._content.get("bufferViews"), view, "views of buffers")
         buffer = self._buffer(found["buffer"])
         begin, size, row = found.get("byteOffset", 0), found["byteLength"], kind.itemsize * width
         stride = found.get("byteStride", row)
@@ -203,8 +213,15 @@ class _Scene:
         return np.ndarray((count, width), kind, buffer, begin + offset, (stride, kind.itemsize))
 
     def _read_buffer(self, number: int) -> bytes:
-        """Return the bytes of a buffer: the binary chunk, or a text in base64."""
-        uri = self._content["buffers"][number].get("uri")
+        """Return the bytes of a buffer, as many as it states."""
+        buffer = _at(self._content.get("buffers"), number, "buffers")
+        there, stated = self._stored(buffer.get("uri"), number), buffer["byteLength"]
+        if not (isinstance(stated, int) and 0 <= stated <= len(there)):
+            raise ShapeError(f"buffer {number}: expected {stated!r:.80} bytes, as it states, got {len(there)}")
+        return there[:stated]
+
+    def _stored(self, uri: Any, number: int) -> bytes:
+        """Return the binary chunk, which up to 3 bytes fill up, or what a text in base64 holds."""
         if uri is None:
             if number:
                 raise ShapeError(f"buffer {number}: expected its bytes in the file, got none")

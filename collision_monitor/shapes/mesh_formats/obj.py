@@ -5,6 +5,7 @@ the |n|-th vertex before its line. Source: Wavefront, Advanced Visualizer Manual
 from __future__ import annotations
 
 from array import array
+from codecs import BOM_UTF8
 from collections.abc import Iterator, Sequence
 from typing import Final, TypeVar
 
@@ -12,7 +13,7 @@ import numpy as np
 
 from collision_monitor.errors import ShapeError
 from collision_monitor.shapes.mesh_formats.faces import triangles_of
-from collision_monitor.shapes.mesh_formats.raw_mesh import Indices, RawMesh
+from collision_monitor.shapes.mesh_formats.raw_mesh import Indices, RawMesh, check_words
 
 Number = TypeVar("Number", int, float)
 
@@ -30,7 +31,7 @@ def read_obj(data: bytes) -> RawMesh:
     """Return the polygons of a file as triangles. Raises ShapeError with the line."""
     places, corners = _Numbers("three coordinates of a vertex"), _Numbers("numbers of vertices as corners of a face")
     before = array("q")  # vertices before each face
-    for line, text in _lines(data):
+    for line, text in _lines(data.removeprefix(BOM_UTF8)):
         words = text.partition(b"#")[0].split()
         if not words:
             continue
@@ -68,10 +69,12 @@ class _Numbers:
     def parsed(self, kind: type[Number]) -> list[Number]:
         """Return the numbers. Raises ShapeError with the line of the first word that is none."""
         try:
+            check_words(self._words)
             return list(map(kind, self._words))
         except ValueError:
             for k, word in enumerate(self._words):
                 try:
+                    check_words((word,))
                     kind(word)
                 except ValueError:
                     shown = word[:40].decode(errors="replace")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.errors import ShapeError
 from collision_monitor.shapes.mesh_formats.faces import triangles_of
-from collision_monitor.shapes.mesh_formats.raw_mesh import Array, Indices, RawMesh
+from collision_monitor.shapes.mesh_formats.raw_mesh import Array, Indices, RawMesh, check_words
 
 _TYPES: Final = {
     "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
@@ -60,8 +60,8 @@ def read_ply(data: bytes) -> RawMesh:
     if missing := [axis for axis in "xyz" if axis not in vertex.columns or axis in vertex.lengths]:
         raise ShapeError(f"expected vertices with x, y and z, got none with {', '.join(missing)}")
     vertices: Array = np.stack([vertex.columns[axis].astype(np.float64) for axis in "xyz"], axis=1)
-    rings = _rings(values.get("face"), len(vertices))
-    strips = _rings(values.get("tristrips"), len(vertices))
+    rings = _rings(values.get("face"), len(vertices), 0)
+    strips = _rings(values.get("tristrips"), len(vertices), -1)
     return RawMesh(vertices, np.concatenate([triangles_of(vertices, *rings), _of_strips(*strips)]))
 
 
@@ -202,6 +202,7 @@ class _Text:
         else:
             self._rows(element, words, lengths)
         try:
+            check_words(word for found in words.values() for word in found)
             columns = {name: np.array(found, np.bytes_).astype(np.float64) for name, found in words.items()}
         except ValueError as error:
             raise ShapeError(f"expected numbers as the values of {element.name}: {error!s:.100}") from None
@@ -239,14 +240,14 @@ def _cut(element: _Element, there: int) -> ShapeError:
     return ShapeError(f"expected {element.count} of the element {element.name}, got {there}: the file is cut off")
 
 
-def _rings(values: _Values | None, total: int) -> tuple[Indices, Indices]:
-    """Return the lengths and the corners of an element's lists of vertices."""
+def _rings(values: _Values | None, total: int, least: int) -> tuple[Indices, Indices]:
+    """Return the lengths and the corners of an element's lists of vertices. least: number that a corner may have."""
     name = next((each for each in _RINGS if values is not None and each in values.lengths), None)
     if values is None or name is None:
         return np.zeros(0, np.int64), np.zeros(0, np.int64)
     numbers = values.columns[name]
     corners = numbers.astype(np.int64)
-    if (corners != numbers).any() or (len(corners) and not (corners.min() >= -1 and corners.max() < total)):
+    if (corners != numbers).any() or (len(corners) and not (corners.min() >= least and corners.max() < total)):
         raise ShapeError(f"expected corners from 0 to {total - 1}, got {numbers.min()} to {numbers.max()}")
     return values.lengths[name], corners
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -18,6 +19,12 @@ scene that places one mesh many times has more triangles than its file has bytes
 
 MOST_PARTS: Final = 100_000
 """Parts of a scene, with those that it places many times."""
+
+
+def check_words(words: Iterable[bytes]) -> None:
+    """Raise ValueError for an underscore in words that are to be numbers: Python takes 1_0 as 10, no format does."""
+    if (word := next((each for each in words if b"_" in each), None)) is not None:
+        raise ValueError(f"{word[:40].decode(errors='replace')!r} is no number")
 
 
 class RawMesh(NamedTuple):

@@ -8,18 +8,21 @@ from __future__ import annotations
 
 import re
 import struct
+from codecs import BOM_UTF8
 from typing import Final
 
 import numpy as np
 
 from collision_monitor.errors import ShapeError
-from collision_monitor.shapes.mesh_formats.raw_mesh import Array, RawMesh
+from collision_monitor.shapes.mesh_formats.raw_mesh import Array, RawMesh, check_words
 
 _HEAD: Final = 84
 _TRIANGLE: Final = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 _SOLID: Final = re.compile(rb"^[ \t]*((?:end[ \t]*)?solid)\b([^\r\n]*)", re.IGNORECASE | re.MULTILINE)
 """The lines around the triangles of a text, with a name that may hold any words."""
+
+_BEGIN: Final = re.compile(rb"\s*solid\b", re.IGNORECASE)
 
 _FACET: Final = (
     b"facet", b"normal", None, None, None, b"outer", b"loop",
@@ -36,8 +39,8 @@ def read_stl(data: bytes) -> RawMesh:
     whole = _HEAD + stated * _TRIANGLE.itemsize
     if len(data) == whole:
         corners: Array = np.frombuffer(data, _TRIANGLE, offset=_HEAD)["corners"].astype(np.float64)
-    elif re.match(rb"\s*solid\b", data, re.IGNORECASE) and re.search(rb"facet|endsolid", data, re.IGNORECASE):
-        corners = _read_text(data)
+    elif _BEGIN.match(text := data.removeprefix(BOM_UTF8)) and re.search(rb"facet|endsolid", text, re.IGNORECASE):
+        corners = _read_text(text)
     elif len(data) < _HEAD:
         raise ShapeError(f"expected the {_HEAD} bytes of a head, or a text that begins with `solid`, got {len(data)}")
     elif len(data) < whole:
@@ -49,7 +52,8 @@ def read_stl(data: bytes) -> RawMesh:
 
 
 def _read_text(data: bytes) -> Array:
-    """Return the corners (n, 3, 3) of a text."""
+    """Return the corners (n, 3, 3) of a text, whatever ends its lines."""
+    data = data.replace(b"\r", b"\n")
     lines = _SOLID.findall(data)
     begins = sum(not word.lower().startswith(b"end") for word, _ in lines)
     if any(b"vertex" in name.lower() for _, name in lines):
@@ -63,6 +67,7 @@ def _read_text(data: bytes) -> Array:
     if len(words) % len(_FACET):
         raise ShapeError(f"expected {len(_FACET)} words for each triangle, got {len(words)}: it is cut off")
     try:
+        check_words(word for place in _COORDINATES for word in words[place :: len(_FACET)])
         columns = [np.array(words[place :: len(_FACET)], np.bytes_).astype(np.float64) for place in _COORDINATES]
     except ValueError as error:
         raise ShapeError(f"expected numbers as coordinates: {error}") from None

@@ -55,9 +55,11 @@ def covering_prism(corners: Floats, low: float, high: float) -> tuple[Parts, str
     """
     finite = (np.abs(corners) <= LARGEST_INPUT).all(1)
     if not finite.any():
-        raise ShapeError(f"footprint: expected at least 3 finite corners, got {int(finite.sum())}")
+        raise ShapeError("footprint: expected at least 3 finite corners, got 0")
     ring = _distinct(corners[finite])
     reason = f"footprint: expected at least 3 finite corners, got {int(finite.sum())}"
+    if len(ring) >= 3:
+        reason = f"footprint: expected finite corners, got {int((~finite).sum())} that are not"
     if finite.all() and len(ring) >= 3:
         try:
             return prism(ring, low, high), ""

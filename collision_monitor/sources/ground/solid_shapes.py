@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from collision_monitor.errors import InputError
 from collision_monitor.shapes.registry import Box, Cone, Cylinder, HalfSpace, Mesh, Shape, Sphere, kind_of
 from collision_monitor.sources.ground.prisms import prism
+from collision_monitor.sources.ground.track_shapes import with_extent
 
 _DIMENSIONS: Final = {1: 3, 2: 1, 3: 2, 4: 2, 5: 1}
 """Numbers of a SolidPrimitive by its type: BOX, SPHERE, CYLINDER, CONE, PRISM."""
@@ -18,9 +19,9 @@ _DIMENSIONS: Final = {1: 3, 2: 1, 3: 2, 4: 2, 5: 1}
 def primitive_shapes(primitive: Any) -> list[Shape]:
     """Return the shapes of a shape_msgs/SolidPrimitive; a concave prism becomes several. Raises InputError, ShapeError.
 
-    CYLINDER and CONE hold [height, radius], ours [radius, height].
+    CYLINDER and CONE hold [height, radius], ours [radius, height]. Sizes of 0 become the least extent.
     """
-    kind, values = int(primitive.type), np.asarray(primitive.dimensions, np.float64)
+    kind, values = int(primitive.type), with_extent(np.asarray(primitive.dimensions, np.float64)).tolist()
     if kind not in _DIMENSIONS:
         raise InputError(f"SolidPrimitive: expected a type from 1 (BOX) to 5 (PRISM), got {kind}")
     if len(values) != _DIMENSIONS[kind]:
@@ -54,7 +55,7 @@ def message_arrays(mesh: Any) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
 
 def plane_shape(plane: Any) -> Shape:
     """Return the solid below a shape_msgs/Plane a x + b y + c z + d = 0, seen along its normal. Raises ShapeError."""
-    a, b, c, d = np.asarray(plane.coef, np.float64)
+    a, b, c, d = np.asarray(plane.coef, np.float64).tolist()
     return HalfSpace((a, b, c), -d)
 
 

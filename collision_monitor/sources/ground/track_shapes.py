@@ -8,6 +8,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.errors import ShapeError
+from collision_monitor.shapes.registry import Cylinder
+
 Measured = tuple[int, NDArray[np.float64]]
 """A kind, and full extents (3,) or corners (n, 3) in m."""
 
@@ -18,6 +21,19 @@ LEAST_EXTENT: Final = 0.01
 def with_extent(sizes: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return extents in which 0 has become LEAST_EXTENT. Negative numbers and NaN stay, and are refused."""
     return np.where(sizes == 0.0, LEAST_EXTENT, sizes)
+
+
+def diameter_around(sizes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the diameters (N,) of the circles around rectangles of extents (N, 2); NaN beside a negative number."""
+    return np.where((sizes >= 0.0).all(1), np.hypot(sizes[:, 0], sizes[:, 1]), np.nan)
+
+
+def upright_cylinder(sizes: NDArray[np.float64]) -> Cylinder:
+    """Return the cylinder of full extents (3,), with the larger of x and y as its diameter. Raises ShapeError."""
+    x, y, z = sizes.tolist()
+    if not (x >= 0.0 and y >= 0.0):  # `max` takes the other one, also beside NaN
+        raise ShapeError(f"cylinder: expected diameters in x and y from 0 on, got {x:g} and {y:g}")
+    return Cylinder(max(x, y) / 2, z)
 
 
 def rounded_up(measured: Measured, tolerance: float) -> Measured:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from collision_monitor.errors import InputError
 from collision_monitor.records import StateFlag
 from collision_monitor.shapes.pose import Pose, rotation_matrix
-from collision_monitor.shapes.registry import Box, Cylinder
+from collision_monitor.shapes.registry import Box
 from collision_monitor.sources.ground.covariances import usable_blocks, yaw_alone
 from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
@@ -24,7 +24,15 @@ from collision_monitor.sources.ground.prisms import covering_prism, load_prisms
 from collision_monitor.sources.ground.scene_states import carry_states, empty_states, turn_twists, turned_triangles
 from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
-from collision_monitor.sources.ground.track_shapes import Measured, held_by, rounded_up, still_held, with_extent
+from collision_monitor.sources.ground.track_shapes import (
+    Measured,
+    diameter_around,
+    held_by,
+    rounded_up,
+    still_held,
+    upright_cylinder,
+    with_extent,
+)
 from collision_monitor.sources.ground.tracks import DescribedTrack, TrackTable
 from collision_monitor.sources.messages.autoware_bytes import POLYGON, TrackArrays
 
@@ -180,7 +188,7 @@ def _measured(content: TrackArrays) -> tuple[NDArray[np.uint8], NDArray[np.float
     around = (kinds == _BOX) & (content.orientation == _NO_ORIENTATION)
     around |= (kinds == POLYGON) & ~np.isin(np.arange(len(kinds)), list(content.footprints))
     kinds[around] = _CYLINDER
-    sizes[around, :2] = np.hypot(sizes[around, 0], sizes[around, 1])[:, None]
+    sizes[around, :2] = diameter_around(sizes[around, :2])[:, None]
     return kinds, sizes
 
 
@@ -199,5 +207,5 @@ def _shapes(described: tuple[int, NDArray[np.float64]], tolerance: float) -> tup
     if kind == _BOX:
         return ((Box(numbers), Pose()),), 0.0, ""
     if kind == _CYLINDER:
-        return ((Cylinder(max(numbers[:2]) / 2, numbers[2]), Pose()),), 0.0, ""
+        return ((upright_cylinder(numbers), Pose()),), 0.0, ""
     raise InputError(f"shape.type: expected 0 (box), 1 (cylinder) or 2 (polygon), got {kind}")

@@ -84,20 +84,23 @@ class CloudSource(Source):
         """Return the points of a LaserScan and of its failed beams, and the number of the latter. Raises InputError."""
         beams = read_beams(scan, nan_is_free=self._entry.nan_is_free, nearest=self._entry.min_range)
         used = beams.met & self._within(beams.points)
-        held = self._memory.stays(beams, scan.header.frame_id, frame, used)
+        held = self._memory.stays(beams, frame_name(scan.header.frame_id), frame, used)
         return np.concatenate([beams.points[used], held]), int(np.count_nonzero(beams.failed))
 
     def _cloud(self, cloud: Any) -> tuple[Floats, int]:
         """Return the points of a PointCloud2 and the number of those without a place. Raises InputError."""
         points, lost = read_cloud_points(cloud)
-        if lost and not len(points) and not self._entry.nan_is_free:
-            raise InputError(f"points: expected finite ones, got none of {lost}; what was there stays")
+        least = self._entry.min_range
+        # the sensor is in none of its points: drivers write 0 for what they did not measure
+        near = int(np.count_nonzero(_squared(points) < least**2)) if points.any() else len(points)
+        if near == len(points) and (near or (lost and not self._entry.nan_is_free)):  # which says nothing of free space
+            expected = f"finite ones beyond {least:g} m" if near else "finite ones"
+            raise InputError(f"points: expected {expected}, got none of {len(points) + lost}; what was there stays")
         return points[self._within(points)], lost
 
     def _within(self, points: Floats) -> NDArray[np.bool_]:
         """Which points (N,) are within the entry's range of the sensor."""
-        with np.errstate(over="ignore"):
-            squared = (points**2).sum(1)
+        squared = _squared(points)
         return np.asarray((squared >= self._entry.min_range**2) & (squared <= self._entry.max_range**2))
 
     def _on_robot(self, cloud: Points, at: Pose, stamp_ns: int, scene: SourceScene) -> NDArray[np.bool_]:
@@ -158,6 +161,12 @@ def read_cloud_points(cloud: Any) -> tuple[Floats, int]:
             points[:, k] = raw[name]
         finite = (np.abs(points) <= LARGEST_INPUT).all(1)
     return (points, 0) if finite.all() else (points[finite], int(count - np.count_nonzero(finite)))
+
+
+def _squared(points: Floats) -> Floats:
+    """Return the squared distances (N,) of points from the sensor, infinite for those beyond all numbers."""
+    with np.errstate(over="ignore"):
+        return np.asarray((points**2).sum(1))
 
 
 def thinned(points: Floats, voxel: float, radius: float) -> tuple[Floats, float]:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from collision_monitor.errors import InputError
 from collision_monitor.records import StateFlag
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.registry import Box, Cylinder
+from collision_monitor.shapes.registry import Box, Shape
 from collision_monitor.sources.ground.covariances import usable_blocks
 from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
@@ -23,7 +23,14 @@ from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.scene_states import carry_states, empty_states
 from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
-from collision_monitor.sources.ground.track_shapes import Measured, held_by, rounded_up, with_extent
+from collision_monitor.sources.ground.track_shapes import (
+    Measured,
+    diameter_around,
+    held_by,
+    rounded_up,
+    upright_cylinder,
+    with_extent,
+)
 from collision_monitor.sources.ground.tracks import LONGEST_KEY, DescribedTrack, TrackTable
 from collision_monitor.sources.messages.poses import worst_stddev
 from collision_monitor.tolerances import LARGEST_INPUT
@@ -67,9 +74,10 @@ class DetectionSource(Source):
         if frame is None:
             self._tracks.touch(self._last, stamp_ns)
             return
-        if len(content.detections) > MOST_DETECTIONS:
+        if more := content.detections[MOST_DETECTIONS:]:
             text = f"expected at most {MOST_DETECTIONS} detections in a message, got {len(content.detections)}"
-            scene.refuse(entry.name, text, len(content.detections) - MOST_DETECTIONS)
+            scene.refuse(entry.name, text, len(more))
+            self._keep(more, stamp_ns)
         found = [each for each in content.detections[:MOST_DETECTIONS] if self._is_wanted(each, scene)]
         if not found:
             return
@@ -80,6 +88,7 @@ class DetectionSource(Source):
         if not near.all():
             text = f"position: expected finite numbers up to {LARGEST_INPUT:g}, got others"
             scene.refuse(entry.name, text, int((~near).sum()))
+            self._keep([each for each, good in zip(found, near.tolist(), strict=True) if not good], stamp_ns)
             found, states = [each for each, good in zip(found, near.tolist(), strict=True) if good], states[near]
         turned = [bool((q == 0.0).all()) for q in states["quaternion"]]
         states["quaternion"][turned] = 0.0, 0.0, 0.0, 1.0
@@ -105,6 +114,13 @@ class DetectionSource(Source):
         self._tracks.restart(now_ns)
         self._last.clear()
         self._heard_ns = now_ns
+
+    def _keep(self, unplaced: list[Any], stamp_ns: int) -> None:
+        """Let the tracks stay that detections without a usable place may be: without an id, all such of their class."""
+        own = {(_class(each), each.id) for each in unplaced}
+        loose = {word for word, name in own if not name}
+        touched = (key for key in self._last if key in own or (key[0] in loose and isinstance(key[1], int)))
+        self._tracks.touch(touched, stamp_ns)
 
     def _is_wanted(self, each: Any, scene: SourceScene) -> bool:
         """Whether a detection is likely enough, and of use."""
@@ -185,7 +201,7 @@ class DetectionSource(Source):
         size = with_extent(np.array([each.bbox.size.x, each.bbox.size.y, each.bbox.size.z], np.float64))
         measured: Measured = _BOX, size
         if turned:  # the upright cylinder about the box
-            measured = _CYLINDER, np.array([np.hypot(*size[:2]), np.hypot(*size[:2]), size[2]])
+            measured = _CYLINDER, np.append(np.repeat(diameter_around(size[None, :2]), 2), size[2])
         if track.shape is not None and (entry.each or held_by(track.shape, measured, entry.shape_tolerance)):
             return True
         described = rounded_up(measured, entry.shape_tolerance)
@@ -215,8 +231,8 @@ class DetectionSource(Source):
             scene.refuse(self._entry.name, text, wrong)
 
 
-def _shape(kind: int, size: Floats) -> Box | Cylinder:
-    return Box(size) if kind == _BOX else Cylinder(max(size[:2]) / 2, size[2])
+def _shape(kind: int, size: Floats) -> Shape:
+    return Box(size) if kind == _BOX else upright_cylinder(size)
 
 
 def _class(detection: Any) -> str:

@@ -43,6 +43,7 @@ class FootprintSource(Source):
         self.name, self.topics = entry.name, {entry.topic: (message_type,)}
         self._entry = entry
         self._corners: Floats | None = None  # (n, 2), in the object's frame
+        self._span = np.zeros(2)  # lowest and highest corner in it, if they are not of one height
         load_prisms()
         self._coarse = ""  # why it is not the footprint itself that is described
 
@@ -62,13 +63,13 @@ class FootprintSource(Source):
         points = np.array([(p.x, p.y, p.z) for p in given], np.float64).reshape(-1, 3)
         usable = (np.abs(points) <= LARGEST_INPUT).all(1)
         if not usable.any():
-            raise ShapeError(f"footprint: expected at least 3 finite corners, got {int(usable.sum())}")
+            raise ShapeError("footprint: expected at least 3 finite corners, got 0")
         middle, turn = points[usable].mean(0), 0.0
         centred = points[:, :2] - middle[:2]
         if self._corners is not None and len(self._corners) == len(centred) and usable.all():
             turn = _turn(self._corners, centred)
             centred = _turned(centred, -turn)
-        if not self._describe(centred, scene):
+        if not self._describe(centred, self._extent(points[usable, 2] - middle[2]), scene):
             return
         states = empty_states([entry.object_id])
         states["position"], states["quaternion"] = middle, (0.0, 0.0, math.sin(turn / 2), math.cos(turn / 2))
@@ -78,18 +79,30 @@ class FootprintSource(Source):
             carry_states(states, frame, None)
         scene.observe(entry.name, states, stamp_ns, window=entry.estimate_over)
 
-    def _describe(self, corners: Floats, scene: SourceScene) -> bool:
-        """Describe the object if its footprint has changed; return whether it is described."""
+    def _extent(self, heights: Floats) -> Floats:
+        """Return the lowest and the highest of heights (n,) about their mean; zeros where they are one height."""
+        span = np.array([heights.min(), heights.max()])
+        return span if self._entry.height and np.ptp(span) > self._entry.shape_tolerance else np.zeros(2)
+
+    def _describe(self, corners: Floats, span: Floats, scene: SourceScene) -> bool:
+        """Describe the object if its footprint has changed; return whether it is described.
+
+        span: its lowest and highest corner.
+        """
         entry, known = self._entry, self._corners
         same = known is not None and known.shape == corners.shape
+        same = same and bool((np.abs(span - self._span) <= entry.shape_tolerance).all())
         if known is None or not same or not float(np.abs(known - corners).max()) <= entry.shape_tolerance:
             try:
-                shapes, self._coarse = covering_prism(corners, 0.0, entry.height)
+                shapes, self._coarse = covering_prism(corners, span[0], span[1] + entry.height)
                 scene.describe(entry.describe(shapes=shapes, extra_padding=entry.shape_tolerance))
             except CollisionMonitorError as error:
                 scene.refuse(entry.name, str(error))
                 return known is not None  # what it was last stays, where it is now
-            self._corners = corners
+            self._corners, self._span = corners, span
+            if span.any():
+                heights = f"footprint: expected corners of one height, got {np.ptp(span):g} m between them"
+                self._coarse = self._coarse or f"{heights}; a prism over all of them is monitored"
         if self._coarse:
             scene.refuse(entry.name, self._coarse)
         return True

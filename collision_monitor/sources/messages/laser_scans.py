@@ -28,6 +28,10 @@ MOST_BEAMS: Final = 1_000_000
 _LARGEST_ANGLE: Final = 8.0 * np.pi
 """rad: of the first beam, and between two; larger ones are no angles."""
 
+_LEAST_STEP: Final = 1e-6
+"""rad between two beams. The finest scanners have 1e-3; with much less, all beams are one, and all of the scan is
+behind the first."""
+
 
 class Beams(NamedTuple):
     """The N beams of a scan: points (N, 3) in its frame (m); whether something is there; whether nothing is known.
@@ -43,7 +47,7 @@ class Beams(NamedTuple):
 
     def nearest_to(self, angles: Floats) -> NDArray[np.intp]:
         """Return the row of the beam nearest to each direction; -1 for a direction outside of the scan."""
-        width = abs(self.step) or 2.0 * np.pi
+        width = abs(self.step) if len(self.met) > 1 else 2.0 * np.pi
         turn = np.mod((angles - self.start) * (1.0 if self.step >= 0.0 else -1.0) + 0.5 * width, 2.0 * np.pi)
         beam = np.floor(turn / width).astype(np.intp)
         return np.where(beam < len(self.met), beam, -1)
@@ -62,7 +66,7 @@ def read_beams(scan: Any, *, nan_is_free: bool = False, nearest: float = 0.0) ->
     low = max(low, 0.0) if low == low else low
     if not low < high:
         raise InputError(f"range_min, range_max: expected a range, got {scan.range_min:g} to {high:g}")
-    if not (abs(start) <= _LARGEST_ANGLE and abs(step) <= _LARGEST_ANGLE and (step or len(ranges) < 2)):
+    if not (abs(start) <= _LARGEST_ANGLE and (_LEAST_STEP <= abs(step) <= _LARGEST_ANGLE or len(ranges) < 2)):
         raise InputError(f"angle_min, angle_increment: expected angles, got {start:g} and {step:g}")
     if len(ranges) > MOST_BEAMS:
         raise InputError(f"ranges: expected at most {MOST_BEAMS}, got {len(ranges)}")
@@ -80,16 +84,16 @@ def read_beams(scan: Any, *, nan_is_free: bool = False, nearest: float = 0.0) ->
 
 
 class BeamMemory:
-    """What the beams of a scanner met last, in the monitor's frame, and in which direction (rad).
+    """What the beams of a scanner met last, in the monitor's frame.
 
-    A later scan may have other angles, or another number of beams: a point belongs to the beam nearest to its
-    direction. Points in directions that a scan does not have are forgotten.
+    The scanner moves on, and a later scan may have other angles, or another number of beams: a point belongs to the
+    beam nearest to its direction from where the scanner is now. Points in directions that a scan does not have are
+    forgotten.
     """
 
     def __init__(self) -> None:
         self._frame = ""
         self._points = np.zeros((0, 3))
-        self._angles = np.zeros(0)
 
     def stays(self, beams: Beams, name: str, frame: FrameMotion, used: Mask) -> Floats:
         """Take over what the beams meet; return the points (K, 3), in the scan's frame, of those that failed.
@@ -98,11 +102,9 @@ class BeamMemory:
         """
         R = rotation_matrix(frame.quaternion)
         if name != self._frame:
-            self._frame, self._points, self._angles = name, np.zeros((0, 3)), np.zeros(0)
-        beam = beams.nearest_to(self._angles)
+            self._frame, self._points = name, np.zeros((0, 3))
+        held = (self._points - frame.position) @ R
+        beam = beams.nearest_to(np.arctan2(held[:, 1], held[:, 0]))
         stays = (beam >= 0) & beams.failed[beam] if len(beams.failed) else beam >= 0
-        held = self._points[stays]
-        met = np.flatnonzero(beams.met & used)
-        self._points = np.concatenate([beams.points[met] @ R.T + frame.position, held])
-        self._angles = np.concatenate([beams.start + beams.step * met, self._angles[stays]])
-        return np.asarray((held - frame.position) @ R)
+        self._points = np.concatenate([beams.points[beams.met & used] @ R.T + frame.position, self._points[stays]])
+        return np.asarray(held[stays])

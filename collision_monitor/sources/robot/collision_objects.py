@@ -142,7 +142,16 @@ def _shapes(message: Any) -> Iterator[tuple[Shape, Pose]]:
 
 
 def _pose(message: Any) -> Pose:
-    """Return the pose of a geometry_msgs/Pose. As in MoveIt, a quaternion of zeros is none."""
+    """Return the pose of a geometry_msgs/Pose. As in MoveIt, a quaternion of zeros is none, and others have no length.
+
+    Source: MoveIt, planning_scene.cpp, poseMsgToEigen.
+    """
     p, q = message.position, message.orientation
     quaternion = np.array([q.x, q.y, q.z, q.w])
-    return Pose((p.x, p.y, p.z), quaternion if quaternion.any() else (0.0, 0.0, 0.0, 1.0))
+    largest = float(np.abs(quaternion).max())  # divided by first, so that no square is too large or too small
+    if largest == 0.0:
+        return Pose((p.x, p.y, p.z))
+    if largest < np.inf:
+        quaternion = quaternion / largest
+        quaternion /= np.linalg.norm(quaternion)
+    return Pose((p.x, p.y, p.z), quaternion)

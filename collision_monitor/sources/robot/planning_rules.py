@@ -36,7 +36,8 @@ class PlanningRules:
         """Take over what a PlanningScene states. Return whether a rule changed.
 
         An empty list of a difference states nothing. A scene that is no difference replaces everything, also by empty
-        lists. Source: MoveIt, planning_scene.cpp, setPlanningSceneMsg and setPlanningSceneDiffMsg.
+        lists. A matrix that cannot be read allows nothing. Source: MoveIt, planning_scene.cpp, setPlanningSceneMsg and
+        setPlanningSceneDiffMsg.
         """
         before = self._matrix, dict(self._padding), dict(self._scale)
         if not content.is_diff:
@@ -45,6 +46,7 @@ class PlanningRules:
             self._scale.clear()
         matrix = content.allowed_collision_matrix
         if len(matrix.entry_names) or len(matrix.default_entry_names):
+            self._matrix = None
             with scene.guard(self._name):
                 self._matrix = CollisionMatrix(matrix)
         for rows, field, known in (

@@ -138,6 +138,9 @@ class PlanningSceneSource(Source):
             name = str(each.object.id)
             with scene.guard(self.name, name):
                 self._change_held(each, name, stamp_ns, scene, leaves_world=name in stays)
+                continue
+            if name not in self._held and name not in self._world:
+                scene.lacks(self.name, f"{self.name}/{name}", scene.last_refusal[self.name])
 
     def _note_octomap(self, content: Any, scene: SourceScene) -> None:
         what = f"{self.name}: octomap"
@@ -198,6 +201,7 @@ class PlanningSceneSource(Source):
             for each in [name] if name else at_link:
                 self._let_go(each, stamp_ns, scene)
             return
+        self._check_link(link)
         solids = message.object.primitives, message.object.meshes, message.object.planes
         known, held = self._world.get(name), self._held.get(name)
         offset, touch = None, frozenset(map(str, message.touch_links))
@@ -224,6 +228,12 @@ class PlanningSceneSource(Source):
                 scene.remove(known.object_id)
         self._held[name] = HeldObject(object_id, content, link, touch, offset)
         self._is_changed = True
+
+    def _check_link(self, link: str) -> None:
+        """Raise InputError if the robot is known and has no such link: what is there stays as it is."""
+        robot = self._robot
+        if robot is not None and robot.robot is not None and link not in robot.robot.tree.links:
+            raise InputError(_no_link(robot.name, link))
 
     def _let_go(self, name: str, stamp_ns: int, scene: SourceScene) -> None:
         """Detach an object. It stays in the world where it is, unless the world has another one of its name."""
@@ -319,7 +329,7 @@ class PlanningSceneSource(Source):
         what, reason = f"{self.name}/{name}", ""
         link = other = None
         if held.link not in robot.robot.tree.links:
-            reason = f"expected it at a link of {robot.name}, got {held.link!r:.80}"
+            reason = _no_link(robot.name, held.link)
         elif frame == held.link:
             scene.has(self.name, what)
             return held.content.pose
@@ -348,6 +358,10 @@ class PlanningSceneSource(Source):
         with scene.guard(self.name):
             return self._rules.of(robot.link_ids, self._held, ids, robot.disabled)
         return LinkRules()
+
+
+def _no_link(robot: str, link: str) -> str:
+    return f"expected it at a link of {robot}, got {link!r:.80}"
 
 
 def _attached(content: Any) -> Any:

@@ -1,7 +1,12 @@
-"""A bag in an MCAP file, read from its records and not by its indexes, which may lack messages or invent them."""
+"""A bag in an MCAP file, read from its records and not by its indexes, which may lack messages or invent them.
+
+What was read is compared with the statistics of the file. A file without them may have indexes of its chunks, which say
+at least how many messages there were.
+"""
 
 from __future__ import annotations
 
+import struct
 from collections import Counter
 from collections.abc import Collection, Iterator
 from io import BytesIO
@@ -21,6 +26,13 @@ from collision_monitor.sources.storage.time_order import TimeOrder
 SALVAGE_HINT: Final = "; `collision-monitor salvage` recovers its complete messages"
 
 
+_INDEX: Final = struct.Struct("<HI")
+"""How the index of a chunk's messages of one channel begins: the channel, and the bytes of the entries behind."""
+
+_ENTRY: Final = 16
+"""Bytes of an entry: a time and an offset."""
+
+
 class McapStorage:
     """An MCAP file. Raises SessionError if it is damaged, or if its summary states other numbers of messages."""
 
@@ -30,10 +42,16 @@ class McapStorage:
         self._order = TimeOrder(path)
         self._schemas: dict[int, Schema] = {}
         self._channels: dict[int, StoredChannel] = {}
+        self._chunks: dict[int, Counter[int]] = {}  # by their offsets: messages of each channel
+        self._indexed = 0  # chunks in the summary's index
         self._scan()
         if self._reader.damage:
-            raise SessionError(damaged_bag(path, f"{self._reader.damage[0]}{SALVAGE_HINT}"))
-        self._compare(self._read_summary())
+            raise self._damaged(self._reader.damage[0])
+        if (statistics := self._read_summary()) is not None:
+            self._compare(statistics)
+        else:
+            self._compare_indexes()
+        self._chunks.clear()
         self.channels = list(self._channels.values())
 
     def messages(self, keys: Collection[int]) -> Iterator[StoredMessage]:
@@ -53,11 +71,13 @@ class McapStorage:
     def _scan(self) -> None:
         """Count the messages of each channel, and note where they are."""
         unknown = 0
-        for begin, records in self._reader.sections():
+        for begin, opcode, records in self._reader.sections():
             first = LATEST + 1
+            there: Counter[int] = Counter()
             for each in records:
                 if isinstance(each, Message):
                     channel = self._channels.get(each.channel_id)
+                    there[each.channel_id] += 1
                     unknown += channel is None
                     if channel is not None:
                         channel.count += 1
@@ -69,10 +89,10 @@ class McapStorage:
                     self._define(each)
             if first <= LATEST:
                 self._order.add(begin, first)
+            if opcode == Opcode.CHUNK:
+                self._chunks[begin] = there
         if unknown:
-            raise SessionError(
-                damaged_bag(self._path, f"{unknown} messages are of channels that it does not define{SALVAGE_HINT}")
-            )
+            raise self._damaged(f"{unknown} messages are of channels that it does not define")
 
     def _define(self, channel: Channel) -> None:
         schema = self._schemas.get(channel.schema_id)
@@ -96,7 +116,9 @@ class McapStorage:
         try:
             for opcode, content in self._reader.summary():
                 stream = ReadDataStream(BytesIO(content))
-                if opcode == Opcode.STATISTICS:
+                if opcode == Opcode.CHUNK_INDEX:
+                    self._indexed += 1
+                elif opcode == Opcode.STATISTICS:
                     statistics = Statistics.read(stream)
                 elif opcode == Opcode.SCHEMA:
                     schema = Schema.read(stream)
@@ -105,22 +127,43 @@ class McapStorage:
                     self._define(channel)
         except Exception as error:  # the library raises many kinds of errors for wrong bytes
             reason = str(error) or repr(error)
-            raise SessionError(damaged_bag(self._path, f"{reason:.200}{SALVAGE_HINT}")) from None
+            raise self._damaged(f"{reason:.200}") from None
         return statistics
 
-    def _compare(self, statistics: Statistics | None) -> None:
+    def _compare(self, statistics: Statistics) -> None:
         """Note what the statistics say of each channel, or compare the total if they do not name the channels."""
-        if statistics is None:
-            return
         stated = Counter(statistics.channel_message_counts)
         there = sum(channel.count for channel in self._channels.values())
         if stated.total() == statistics.message_count:
-            for key, channel in self._channels.items():
-                channel.stated = stated[key]
+            self._state(stated, "summary")
         elif statistics.message_count != there:
-            raise SessionError(
-                damaged_bag(
-                    self._path,
-                    f"its summary states {statistics.message_count} messages, there are {there}{SALVAGE_HINT}",
-                )
-            )
+            raise self._damaged(f"its summary states {statistics.message_count} messages, there are {there}")
+
+    def _compare_indexes(self) -> None:
+        """Compare the indexes of chunks with the chunks: of each chunk, the index of its messages follows it."""
+        if self._indexed > len(self._chunks):
+            raise self._damaged(f"its summary states {self._indexed} chunks, there are {len(self._chunks)}")
+        if not self._chunks:
+            return
+        stated = Counter({key: channel.count for key, channel in self._channels.items()})
+        left: Counter[int] = Counter()  # messages of the last chunk that no index has named
+        for at, opcode, content in self._reader.glance():
+            if opcode == Opcode.CHUNK:
+                left = self._chunks.get(at, Counter())
+            elif opcode == Opcode.MESSAGE_INDEX and len(content) >= _INDEX.size:
+                key, size = _INDEX.unpack_from(content)
+                left[key] -= size // _ENTRY
+                if left[key] < 0:
+                    stated[key] -= left[key]
+                    left[key] = 0
+        self._state(stated, "index")
+
+    def _state(self, stated: Counter[int], where: str) -> None:
+        """Note how many messages of each channel the file states. Raises SessionError for some of unknown channels."""
+        for key, channel in self._channels.items():
+            channel.stated, channel.stated_by = stated[key], where
+        if lost := sum(count for key, count in stated.items() if key not in self._channels):
+            raise self._damaged(f"its {where} states {lost} messages of channels that are not there")
+
+    def _damaged(self, reason: str) -> SessionError:
+        return SessionError(damaged_bag(self._path, f"{reason}{SALVAGE_HINT}"))

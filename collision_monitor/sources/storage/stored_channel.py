@@ -16,7 +16,8 @@ class StoredChannel:
 
     key: by which the file knows it. type: such as `nav_msgs/msg/Odometry`. encoding: of its messages, `cdr` or `ros1`.
     definition: of its type, in the form `form` (`ros2msg`, `ros2idl`, …). count: messages there. readable: those that
-    can be read. stated: how many the file's own summary says; None if it has none. problem: why none can be used.
+    can be read. stated: how many the file itself says elsewhere, in its `stated_by`; None if it does not. problem: why
+    none can be used.
     """
 
     key: int
@@ -28,6 +29,7 @@ class StoredChannel:
     count: int = 0
     readable: int = 0
     stated: int | None = None
+    stated_by: str = "summary"
     problem: str = ""
 
 

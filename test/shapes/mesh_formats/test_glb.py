@@ -81,6 +81,7 @@ def test_numbers_may_be_interleaved_quantised_changed_one_by_one_or_in_base64() 
         {"buffer": 0, "byteOffset": 0, "byteLength": rows.nbytes, "byteStride": 8},
         {"buffer": 0, "byteOffset": rows.nbytes, "byteLength": len(corners)},
     ]
+    content["buffers"] = [{"byteLength": rows.nbytes + len(corners)}]
     content["extensionsRequired"] = ["KHR_mesh_quantization"]
     mesh = read(content, rows.tobytes() + corners)
     np.testing.assert_allclose(mesh.vertices, np.maximum(grid / 32767, -1), rtol=1e-12)
@@ -91,6 +92,7 @@ def test_numbers_may_be_interleaved_quantised_changed_one_by_one_or_in_base64() 
         {"buffer": 0, "byteOffset": len(binary), "byteLength": 4},
         {"buffer": 0, "byteOffset": len(binary) + 4, "byteLength": 24},
     ]
+    content["buffers"] = [{"byteLength": len(binary) + len(changed)}]
     content["accessors"][0]["sparse"] = {
         "count": 2, "indices": {"bufferView": 2, "componentType": 5123}, "values": {"bufferView": 3},
     }  # fmt: skip
@@ -142,6 +144,17 @@ SILENT = {
     "an accessor beyond its view": (changed(accessors__1__count=10**9), "view 1: expected 4000000000 bytes"),
     "an offset before the view": (changed(accessors__1__byteOffset=-4), "view 1: expected"),
     "a wrong mode": (changed(meshes__0__primitives__0__mode=7), "expected a mode from 0 to 6, got 7"),
+    "a mesh before the first one": (changed(nodes__0__mesh=-1), "expected the number of one of 1 meshes, got -1"),
+    "a scene before the first one": (changed(scene=-1), "scenes, got -1"),
+    "a node before the first one": (changed(scenes__0__nodes=[-1]), "nodes, got -1"),
+    "an accessor before the first one": (changed(meshes__0__primitives__0__indices=-1), "accessors, got -1"),
+    "a buffer before the first one": (changed(bufferViews__0__buffer=-1), "of 1 buffers, got -1"),
+    "a number as a text": (changed(nodes__0__mesh="0"), "of 1 meshes, got '0'"),
+    "a change before the first value": (changed(accessors__0__sparse={
+        "count": 1, "indices": {"bufferView": 0, "componentType": 5120, "byteOffset": 3}, "values": {"bufferView": 0},
+    }), "accessor 0: expected changes of its"),
+    "a buffer of more than is there": (changed(buffers__0__byteLength=10**9), "buffer 0: expected 1000000000 bytes"),
+    "a buffer of less than its views": (changed(buffers__0__byteLength=4), "view 0: expected"),
     "two corners": (changed(accessors__1__count=179), "three corners for each triangle, got 179"),
 }  # fmt: skip
 

@@ -45,6 +45,10 @@ def test_every_way_to_write_a_corner() -> None:
         np.testing.assert_array_equal(mesh.faces, FACES)
 
 
+def test_a_mark_of_the_encoding_is_no_word() -> None:
+    assert len(read_obj(b"\xef\xbb\xbfv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").faces) == 1
+
+
 def test_polygons_keep_their_area_and_close() -> None:
     lines = [f"v {x} {y} {z}" for x, y, z in CUBE.tolist()]
     lines += ["f " + " ".join(str(k + 1) for k in quad) for quad in CUBE_QUADS]
@@ -63,6 +67,8 @@ BROKEN = {
     "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999999999999999999": "more than 64 bits",
     "v 0 0 0\nw 1 0 0": "line 2: expected vertices (v) and faces (f), got 'w', which is not read",
     "surf 0 1 0 1 1 2 3": "got 'surf', which is not read",
+    "v 1_0 0 0": "line 1: expected three coordinates of a vertex, got '1_0'",
+    "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 0_3": "line 4: expected numbers of vertices as corners of a face, got '0_3'",
     "call other.obj": "got 'call'",
     "\x89PNG": "which is not read",
 }

@@ -101,6 +101,8 @@ BROKEN = {
     "list": (TEXT.replace("\n3 0 1 2", "\n-3 0 1 2"), "face 0: expected the length of a list, got b'-3'"),
     "range": (TEXT.replace("\n3 0 1 2", "\n3 0 1 4"), "expected corners from 0 to 3, got 0.0 to 4.0"),
     "fraction": (TEXT.replace("\n3 0 1 2", "\n3 0 1 1.5"), "expected corners from 0 to 3"),
+    "a number of Python": (TEXT.replace("\n3 0 1 2", "\n3 0 1 0_2"), "expected numbers as the values of face"),
+    "a corner below 0": (TEXT.replace("\n3 0 1 2", "\n3 0 1 -1"), "expected corners from 0 to 3, got -1.0"),
     "two corners": (TEXT.replace("\n3 0 1 2", "\n2 0 1"), "at least 3 corners, got one of 2"),
 }
 

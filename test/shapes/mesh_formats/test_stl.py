@@ -22,7 +22,8 @@ def test_the_size_tells_a_binary_file_whatever_its_head_says(head: bytes) -> Non
 
 def test_a_text_may_have_several_solids_any_case_and_any_spaces() -> None:
     text = stl_text(POINTS, FACES[:20], "a name of words, facet too") + stl_text(POINTS, FACES[20:], "")
-    for variant in (text, text.upper(), text.replace("\n", "\r\n"), text.replace("\n   vertex", " \t vertex")):
+    ends = text.replace("\n", "\r\n"), text.replace("\n", "\r")
+    for variant in (text, text.upper(), *ends, "\ufeff" + text, text.replace("\n   vertex", " \t vertex")):
         mesh = read_stl(variant.encode())
         np.testing.assert_array_equal(mesh.vertices[mesh.faces], POINTS[FACES])
     assert len(read_stl(b"solid of nothing\nendsolid").faces) == 0
@@ -40,6 +41,7 @@ BROKEN = {
     "text cut in a triangle": (stl_text(POINTS, FACES)[:-200] + "\nendsolid", "for each triangle"),
     "a word that is damaged": (stl_text(POINTS, FACES).replace("endloop", "endlo0p", 1), "expected the word endloop"),
     "a number that is damaged": (stl_text(POINTS, FACES).replace("vertex ", "vertex x", 1), "expected numbers"),
+    "a number of Python": (stl_text(POINTS, FACES).replace("vertex ", "vertex 1_", 1), "expected numbers"),
     "all in one line": (stl_text(POINTS, FACES).replace("\n", " "), "`solid` and the name alone in a line"),
     "another format": ("v 0 0 0\n" * 100, "it is cut off, or no STL"),
 }

@@ -11,6 +11,8 @@ from fed import Fed
 from foreign_bag import START, odometry, transforms
 from foreign_messages import detection, detections, laser_scan, point_cloud, track, tracked_objects
 
+from collision_monitor.shapes.pose import rotation_matrix
+
 STEP = 50_000_000
 NAN, INF = math.nan, math.inf
 SPHERE = {"sphere": 1.0}
@@ -32,7 +34,7 @@ def points_of(fed: Fed) -> Any:
     last = fed.changes[-1]
     if not hasattr(last, "shapes"):
         return np.zeros((0, 3))
-    (cloud, _), = last.shapes
+    ((cloud, _),) = last.shapes
     return cloud.points + last.pose.position  # type: ignore[union-attr]
 
 
@@ -49,6 +51,8 @@ FAILED: dict[str, tuple[Any, dict[str, float]]] = {
     "range_min NaN": ([1.0, INF, 2.0, INF], {"range_min": NAN}),
     "angle_increment NaN": ([1.0, INF, 2.0, INF], {"angle_increment": NAN}),
     "angle_increment infinite": ([1.0, INF, 2.0, INF], {"angle_increment": INF}),
+    "angle_increment 1e-30": ([1.0, INF, 2.0, INF], {"angle_increment": 1e-30}),
+    "angle_increment -1e-38": ([1.0, INF, 2.0, INF], {"angle_increment": -1e-38}),
     "angle_increment 0": ([1.0, INF, 2.0, INF], {"angle_increment": 0.0}),
     "angle_min NaN": ([1.0, INF, 2.0, INF], {"angle_min": NAN}),
     "angle_min of no angle": ([1.0, INF, 2.0, INF], {"angle_min": 1e30}),
@@ -98,6 +102,29 @@ def test_each_beam_that_fails_keeps_what_it_met_in_the_world() -> None:
     assert see(3, 3.0, [INF, NAN, 1, 0]) == {(1, 3, 0), (2, 0, 0)}
     assert see(4, 3.0, [INF, INF, INF, INF]) == set()
     assert fed.feed.scene.points_dropped["scan"] == 1 + 2 + 3 + 2 + 0
+
+
+def test_what_was_met_is_in_the_direction_from_where_the_scanner_is_now() -> None:
+    """The robot turns: another beam looks at what was met, and that one says whether it is still there."""
+    fed = Fed({"scan": {"topic": "/scan"}})
+
+    def see(k: int, at_map: Any, yaw: float, ranges: Any) -> Any:
+        turn = (0, 0, math.sin(yaw / 2), math.cos(yaw / 2))
+        fed.give("/tf", at(k), transforms(at(k), ("map", "laser", at_map, turn)))
+        kind, content = laser_scan("/laser" if k % 2 else "laser", at(k), ranges, start=0.0, step=math.pi / 2)
+        fed.give("/scan", at(k), (kind, content))
+        points = points_of(fed)
+        if len(points):
+            cloud = fed.changes[-1].shapes[0][0].points @ rotation_matrix(np.array(turn)).T  # type: ignore[union-attr]
+            points = cloud + at_map
+        return {tuple(np.round(point, 6) + 0.0) for point in points}
+
+    quarter = math.pi / 2
+    assert see(0, (0, 0, 0), 0.0, [5, INF, INF, INF]) == {(5, 0, 0)}
+    assert see(1, (0, 0, 0), quarter, [INF, INF, INF, NAN]) == {(5, 0, 0)}  # its last beam looks at it now, and fails
+    assert see(2, (0, 0, 0), 2 * quarter, [NAN, INF, NAN, INF]) == {(5, 0, 0)}
+    assert see(3, (5, 9, 0), quarter, [NAN, INF, NAN, INF]) == {(5, 0, 0)}  # from the north it is behind the robot
+    assert see(4, (5, 9, 0), 0.0, [NAN, NAN, NAN, INF]) == set()  # and now at its right, where nothing is
 
 
 LATER: dict[str, tuple[Any, float, float]] = {
@@ -159,6 +186,52 @@ def test_a_cloud_without_a_finite_point_removes_nothing_and_an_empty_one_does() 
     assert fed.names == ["cloud"] and sum(fed.refused.values()) == 3
     fed.give("/cloud", at(4), point_cloud("map", at(4), []))
     assert fed.names == ["cloud", "-1"]
+
+
+NOTHING_SEEN: dict[str, tuple[Any, dict[str, Any]]] = {
+    "all too near": ([(0.1, 0, 0), (0, 0.05, 0)], {"min_range": 0.2}),
+    "too near or NaN": ([(0.1, 0, 0), (NAN, 0, 0)], {"min_range": 0.2}),
+    "too near, and NaN is free": ([(0.1, 0, 0), (NAN, 0, 0)], {"min_range": 0.2, "nan_is_free": True}),
+    "all 0": ([(0, 0, 0)] * 5, {}),
+    "all beyond all numbers": ([(3e38, 0, 0), (0, -3e38, 0)], {}),
+}
+
+
+@pytest.mark.parametrize("kind", NOTHING_SEEN)
+def test_a_cloud_of_points_that_are_no_measurement_removes_nothing(kind: str) -> None:
+    points, entry = NOTHING_SEEN[kind]
+    fed = Fed({"cloud": {"topic": "/cloud", **entry}}, begin=START)
+    fed.give("/cloud", at(0), point_cloud("map", at(0), [(1, 2, 3)]))
+    fed.give("/cloud", at(1), point_cloud("map", at(1), points))
+    assert fed.names == ["cloud"] and [row.what for row in fed.feed.unmonitored] == ["/cloud"]
+    fed.give("/cloud", at(2), point_cloud("map", at(2), [*points, (1, 2, 4)]))
+    assert not fed.feed.unmonitored and fed.names == ["cloud"] * 2
+
+
+@pytest.mark.parametrize("name", ["", "a"])
+def test_a_detection_without_a_place_keeps_its_track(name: str) -> None:
+    fed = Fed({"people": {"topic": "/d", "forget_after": 0.5}})
+    fed.give(
+        "/d", at(0), detections("map", at(0), detection((1, 0, 0), name=name), detection((9, 0, 0), name=name * 2))
+    )
+    for k in range(1, 40):
+        nowhere = detection((NAN if k % 2 else 1e30, 0, 0), name=name)
+        fed.give("/d", at(k), detections("map", at(k), nowhere, detection((9, 0, 0), name=name * 2)))
+    assert len(fed.names) == 2 and sum(fed.refused.values()) == 39
+    for k in range(40, 60):
+        fed.give("/d", at(k), detections("map", at(k), detection((9, 0, 0), name=name * 2)))
+    assert len(fed.names) == 3 and fed.names[2].startswith("-")  # it is gone, now that no detection may be it
+
+
+def test_detections_beyond_the_bound_keep_their_tracks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("collision_monitor.sources.messages.detections.MOST_DETECTIONS", 2)
+    fed = Fed({"people": {"topic": "/d", "forget_after": 0.5}})
+    a, b, c = (detection((k, 0, 0), name=name) for k, name in enumerate("abc"))
+    fed.give("/d", at(0), detections("map", at(0), a, b))
+    for k in range(1, 30):
+        fed.give("/d", at(k), detections("map", at(k), b, c, a))
+    assert fed.names == ["people_person_a", "people_person_b", "people_person_c"]
+    assert sum(fed.refused.values()) == 29
 
 
 @pytest.mark.parametrize("kind", ["tracks", "detections", "scan"])

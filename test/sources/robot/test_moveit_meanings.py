@@ -141,6 +141,52 @@ def test_missing_poses_and_zero_quaternions_are_the_identity() -> None:
     assert it.pose is not None and it.pose.quaternion.tolist() == [0, 0, 0, 1] and not played.refusals
 
 
+@pytest.mark.parametrize(
+    "turn", [(0, 0, 0, 2), (0.3, 0, 0, 0.4), (1e-30, 0, 0, 1e-30), (1e200, 0, 0, 0), (0, 0, 0, -1)]
+)
+def test_quaternions_of_objects_have_no_length(turn: Any) -> None:
+    played = with_world()
+    played.send("/scene", SCENE, a_scene(cup(at=pose((1, 0, 0), turn))))
+    at = played.objects["world/cup"].pose
+    unit = np.divide(turn, max(map(abs, turn)))
+    assert at is not None and not played.refusals
+    np.testing.assert_allclose(at.quaternion, unit / np.linalg.norm(unit), atol=1e-15)
+
+
+@pytest.mark.parametrize("flat", [(2, 0), (3, 0, 1), (3, 1, 0), (4, 0, 1), (1, 0, 0, 0)])
+def test_solids_of_no_size_have_a_least_extent(flat: Any) -> None:
+    played = with_world()
+    played.send("/scene", SCENE, a_scene(cup(solid(*flat))))
+    assert set(played.objects) == {"world/cup"} and not played.refusals
+
+
+def test_what_cannot_be_attached_is_listed_and_the_world_keeps_its_objects() -> None:
+    played, _ = ready()
+    before = set(played.objects)
+    bad = [attached("hand", an_object("ghost")), attached("hand", an_object("pen", solid(2, np.nan), frame="hand"))]
+    played.send("/scene", SCENE, a_scene(held=[*bad, attached("hand", cup(frame="hand"))]))
+    assert set(played.objects) == {*before, "arm/cup"}
+    assert {row.what for row in played.feed.unmonitored} == {"arm/ghost", "arm/pen"}
+    played, _ = ready()
+    played.send("/scene", SCENE, a_scene(cup(at=pose((3, 0, 0)))))
+    played.send("/scene", SCENE, a_scene(held=[attached("no_link", an_object("cup"))]))
+    assert [it.static for it in described(played, "arm/cup")] == [True] and not played.feed.unmonitored
+    played.send("/scene", SCENE, a_scene(an_object("cup", operation=REMOVE)))
+    assert set(played.objects) == before
+
+
+@pytest.mark.parametrize("is_diff", [True, False])
+def test_a_matrix_that_cannot_be_read_allows_nothing(is_diff: bool) -> None:
+    played, _ = ready()
+    table, before = an_object("table", solid(1, 1, 1, 1)), allowed_pairs(played)
+    rows = np.array([[False, True], [True, False]])
+    played.send("/scene", SCENE, a_scene(table, allowed_collision_matrix=matrix(["hand", "table"], rows)))
+    assert allowed_pairs(played) - before == {("hand", "table")}
+    cut = matrix(["hand", "table"], rows[:1])
+    played.send("/scene", SCENE, a_scene(table, is_diff=is_diff, allowed_collision_matrix=cut))
+    assert allowed_pairs(played) == before and len(played.refusals) == 1
+
+
 def test_an_object_whose_change_is_refused_stays_as_it_was() -> None:
     played = with_world()
     played.send("/scene", SCENE, a_scene(cup()))
