@@ -34,6 +34,7 @@ from collision_monitor.motion.bodies import Parts, chain_radius, next_pair
 from collision_monitor.motion.motion import MOTION, quaternion_to_matrix
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.query.impact.impact_query import MotionQuery
+from collision_monitor.query.kernel_arguments import set_rotation, tables_of
 from collision_monitor.query.library import LIBRARY, Slots
 from collision_monitor.shapes.pose import Motion
 from collision_monitor.shapes.registry import BALL
@@ -127,19 +128,16 @@ def impact_of_chains(
     A motion is a pose, a linear and an angular velocity and an acceleration, in the world. begin: time (s) before which
     there is none.
     """
-    table = ShapeTable(
+    table, parts, scratch = tables_of(
         kind, size, margin, radius, vertex_start, vertex_count, vertices, vertex_index, local_position, local_rotation,
-        blocks,
+        blocks, next_part, index, placed, rotation, quaternion, out, work, tree, answer, triangle,
     )  # fmt: skip
-    parts, scratch = Parts(next_part, index, placed), Scratch(rotation, quaternion, out, work, tree, answer, triangle)
     A, B = motion[0], motion[1]
     A.x, A.y, A.z, A.vx, A.vy, A.vz, A.wx, A.wy, A.wz = ax, ay, az, avx, avy, avz, awx, awy, awz
     B.x, B.y, B.z, B.vx, B.vy, B.vz, B.wx, B.wy, B.wz = bx, by, bz, bvx, bvy, bvz, bwx, bwy, bwz
     A.ax, A.ay, A.az, B.ax, B.ay, B.az = aax, aay, aaz, bax, bay, baz
-    quaternion[0, 0], quaternion[0, 1], quaternion[0, 2], quaternion[0, 3] = ai, aj, ak, aw
-    quaternion_to_matrix(quaternion, 0, A.rotation)
-    quaternion[0, 0], quaternion[0, 1], quaternion[0, 2], quaternion[0, 3] = bi, bj, bk, bw
-    quaternion_to_matrix(quaternion, 0, B.rotation)
+    set_rotation(scratch, ai, aj, ak, aw, A.rotation)
+    set_rotation(scratch, bi, bj, bk, bw, B.rotation)
     search, chains = ImpactQuery(separation, tolerance, iterations), (np.int32(a), np.int32(b))
     return _first_impact(table, parts, chains, Window(begin, horizon), search, scratch, (motion, event, row))
 
