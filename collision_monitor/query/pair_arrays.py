@@ -82,8 +82,8 @@ def pose_rows(value: Any, name: str) -> Array:
     if found.shape[-2:] == (4, 4):
         matrices = np.array(found.reshape(-1, 4, 4), order="C")
         rows = np.empty((len(matrices), 7))
-        bad = matrices_to_poses(matrices, rows)
-        return rows if bad < 0 else np.array([as_pose(matrices[bad], f"{name}, {bad}").numbers])
+        wrong = matrices_to_poses(matrices, rows)
+        return rows if wrong < 0 else np.array([as_pose(matrices[wrong], f"{name}, {wrong}").numbers])
     if found.ndim in (1, 2) and found.shape[-1] == 3:
         found = np.concatenate([np.atleast_2d(found), np.tile([0.0, 0.0, 0.0, 1.0], (found.size // 3, 1))], axis=1)
     rows = checked_rows(found, 7, name, LARGEST_INPUT, PoseError)
