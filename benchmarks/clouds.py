@@ -53,7 +53,7 @@ def main() -> None:
     parser.add_argument("--robots", type=int, default=100)
     options = parser.parse_args()
     rng = np.random.default_rng(0)
-    scans = [room(options.points, rng) for _ in range(4)]
+    scans = [room(options.points, rng) for _ in range(TURNS + 2)]  # a sensor never sends the same points again
     messages = [
         encode_descriptions(0, "world", [ObjectDescription(1, cm.Points(scan, 0.03), static=True, pose=cm.Pose())])
         for scan in scans
@@ -70,7 +70,7 @@ def main() -> None:
     stamp = [0]
 
     def describe() -> None:
-        assert len(pipeline.on_shapes(messages[stamp[0] % 4])) == 1
+        assert len(pipeline.on_shapes(messages[stamp[0]])) == 1
 
     def step() -> None:
         stamp[0] += 1
@@ -80,7 +80,7 @@ def main() -> None:
     describe()
     step()
     measure({
-        "tree": lambda: cloud_tree(scans[stamp[0] % 4]),
+        "tree": lambda: cloud_tree(scans[stamp[0]]),
         "message to description, with tree": describe,
         f"step, {options.robots} robots": step,
     })  # fmt: skip

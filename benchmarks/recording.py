@@ -54,6 +54,8 @@ QUIET = 0.25
 recorder."""
 RATE = 20_000
 """Messages/s that the recorder takes while steps are timed."""
+DIFFERENT = 1 << 14
+"""Messages before one is written again: more than a chunk holds, or they would be compressed to nothing."""
 
 CHILD = """
 import sys, time
@@ -71,19 +73,19 @@ while True:
 """
 
 
-def payload(k: int) -> bytes:
-    """About 1 kB that compresses as little as states do."""
-    return np.random.default_rng(k % 64).normal(size=128).tobytes()
+def payloads(count: int) -> list[bytes]:
+    """Messages of 1 kB that compress as little as states do."""
+    return [row.tobytes() for row in np.random.default_rng(0).normal(size=(count, 128))]
 
 
 def sustained(folder: Path, seconds: float) -> dict[str, float]:
     """Messages/s and MB/s that reach the operating system, through the queue."""
-    data = [payload(k) for k in range(64)]
+    data = payloads(DIFFERENT)
     recorder = Recorder(folder / "sustained.mcap", TYPES, {"profile": "{}"}, patient=True, queue_bytes=16 << 20)
     begin, k = time.perf_counter(), 0
     while time.perf_counter() - begin < seconds:
         for _ in range(500):
-            recorder.write(STATES, data[k % 64], k, k)
+            recorder.write(STATES, data[k % DIFFERENT], k, k)
             k += 1
     recorder.close()
     took = time.perf_counter() - begin
@@ -157,7 +159,7 @@ def step_cost(folder: Path, rounds: int, steps: int) -> dict[str, float]:
     Ratios are medians over rounds of three blocks; each block runs the same steps in its own pipeline. write_us: time
     of one `write` (µs).
     """
-    scene, data = Crossing(), [payload(k) for k in range(64)]
+    scene, data = Crossing(), payloads(DIFFERENT)
     pipelines = [Pipeline("balanced") for _ in range(3)]
     for pipeline in pipelines:
         pipeline.on_shapes(scene.shapes())
@@ -191,7 +193,7 @@ def step_cost(folder: Path, rounds: int, steps: int) -> dict[str, float]:
                 taker.write(PREDICTIONS, outputs.predictions, step, step)
                 sent += 3
                 while sent < (before - begin) * RATE:
-                    taker.write(STATES, data[sent % 64], step, step)
+                    taker.write(STATES, data[sent % DIFFERENT], step, step)
                     sent += 1
                 spent += time.perf_counter() - before
             time.sleep(0.0005)

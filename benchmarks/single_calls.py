@@ -6,9 +6,9 @@
 
 Each call gets another place, apart or overlapping, of places that are drawn before. Every library makes new pose
 objects from the same numbers in each call, and python-fcl also gives its nearest points. Beside that, the table has
-calls with poses of other types, with new shapes, and with the same objects again. All take turns in one process. Prints
-microseconds of processor time, the best and the median round, and the ratio of the best to that of python-fcl's
-`distance` with a new Transform.
+calls with poses of other types, with new shapes of other sizes, and with the same objects again. All take turns in one
+process. Prints microseconds of processor time, the best and the median round, and the ratio of the best to that of
+python-fcl's `distance` with a new Transform.
 """
 
 from __future__ import annotations
@@ -34,20 +34,38 @@ POINTS = np.random.default_rng(0).normal(size=(30, 3))
 POINTS /= np.linalg.norm(POINTS, axis=1)[:, None]
 
 
-def _fcl_hull() -> Any:
-    triangles = ConvexHull(POINTS).simplices
+def _fcl_hull(s: float = 1.0) -> Any:
+    triangles = ConvexHull(s * POINTS).simplices
     faces = np.concatenate([np.full((len(triangles), 1), 3), triangles], axis=1).ravel()
-    return fcl.Convex(POINTS, len(triangles), faces)
+    return fcl.Convex(s * POINTS, len(triangles), faces)
 
 
-KINDS: Final[dict[str, tuple[Callable[[], Any], Callable[[], Any], Callable[[], Any]]]] = {
-    "box": (lambda: cm.Box((1, 1.2, 0.8)), lambda: fcl.Box(1, 1.2, 0.8), lambda: trimesh.creation.box((1, 1.2, 0.8))),
-    "sphere": (lambda: cm.Sphere(0.6), lambda: fcl.Sphere(0.6), lambda: trimesh.creation.icosphere(radius=0.6)),
-    "capsule": (lambda: cm.Capsule(0.3, 1), lambda: fcl.Capsule(0.3, 1), lambda: trimesh.creation.capsule(1, 0.3)),
-    "cylinder": (lambda: cm.Cylinder(0.4, 1), lambda: fcl.Cylinder(0.4, 1), lambda: trimesh.creation.cylinder(0.4, 1)),
-    "hull": (lambda: cm.ConvexHull(POINTS), _fcl_hull, lambda: trimesh.convex.convex_hull(POINTS)),
+Make = Callable[..., Any]
+
+KINDS: Final[dict[str, tuple[Make, Make, Make]]] = {
+    "box": (
+        lambda s=1.0: cm.Box((s, 1.2 * s, 0.8 * s)),
+        lambda s=1.0: fcl.Box(s, 1.2 * s, 0.8 * s),
+        lambda: trimesh.creation.box((1, 1.2, 0.8)),
+    ),
+    "sphere": (
+        lambda s=1.0: cm.Sphere(0.6 * s),
+        lambda s=1.0: fcl.Sphere(0.6 * s),
+        lambda: trimesh.creation.icosphere(radius=0.6),
+    ),
+    "capsule": (
+        lambda s=1.0: cm.Capsule(0.3 * s, s),
+        lambda s=1.0: fcl.Capsule(0.3 * s, s),
+        lambda: trimesh.creation.capsule(1, 0.3),
+    ),
+    "cylinder": (
+        lambda s=1.0: cm.Cylinder(0.4 * s, s),
+        lambda s=1.0: fcl.Cylinder(0.4 * s, s),
+        lambda: trimesh.creation.cylinder(0.4, 1),
+    ),
+    "hull": (lambda s=1.0: cm.ConvexHull(s * POINTS), _fcl_hull, lambda: trimesh.convex.convex_hull(POINTS)),
 }
-"""Name -> makers of our shape, of fcl's and of trimesh's."""
+"""Name -> makers of our shape and of fcl's, for a factor of the size, and of trimesh's."""
 
 PAIRS: Final = ("box-capsule", "box-box", "sphere-sphere", "cylinder-box", "hull-box", "hull-hull")
 REFERENCE: Final = "fcl.distance, new Transform"
@@ -79,6 +97,7 @@ class Places:
         self.poses = of([cm.Pose(*pair) for pair in pairs])
         wxyz = quaternions[:, [3, 0, 1, 2]]
         self.fcl = of([(q, x) for x, q in zip(positions, wxyz, strict=True)])
+        self.sizes = of(rng.uniform(0.5, 1.5, 2 * PLACES).tolist())
         twists = rng.normal(size=(PLACES, 3))
         self.motions = itertools.cycle(
             [
@@ -116,7 +135,8 @@ def candidates(a: str, b: str) -> dict[str, Callable[[], Any]]:
 
     def new_shapes() -> Any:
         x, y = next(place.tuples)
-        return cm.contact(KINDS[a][0](), cm.Pose(*x), KINDS[b][0](), cm.Pose(*y))
+        s, t = next(place.sizes)
+        return cm.contact(KINDS[a][0](s), cm.Pose(*x), KINDS[b][0](t), cm.Pose(*y))
 
     F, G = (fcl.CollisionObject(KINDS[kind][1]()) for kind in (a, b))
 
@@ -128,8 +148,9 @@ def candidates(a: str, b: str) -> dict[str, Callable[[], Any]]:
 
     def fcl_new_shapes() -> Any:
         x, y = next(place.fcl)
-        first = fcl.CollisionObject(KINDS[a][1](), fcl.Transform(*x))
-        second = fcl.CollisionObject(KINDS[b][1](), fcl.Transform(*y))
+        s, t = next(place.sizes)
+        first = fcl.CollisionObject(KINDS[a][1](s), fcl.Transform(*x))
+        second = fcl.CollisionObject(KINDS[b][1](t), fcl.Transform(*y))
         return fcl.distance(first, second, fcl.DistanceRequest(enable_nearest_points=True), fcl.DistanceResult())
 
     calls = {

@@ -13,12 +13,12 @@ from collision_monitor.errors import PoseError
 from collision_monitor.geometry.bounded_cache import bounded_cache
 from collision_monitor.meshes.trees.shape_trees import CERTAIN, NEVER, UNCERTAIN, kept_tree
 from collision_monitor.objects.models import containing_kdop, containing_model, exact_model, parse_model
-from collision_monitor.query.library import LIBRARY, Slots
+from collision_monitor.query.library import LIBRARY, WITH_TREE, Slots
 from collision_monitor.records import Model
 from collision_monitor.shapes.compound import Compound, shape_pairs
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.registry import Mesh, Points, Shape, kind_of
+from collision_monitor.shapes.registry import Mesh, Shape, kind_of
 from collision_monitor.shapes.shape import array_bytes
 from collision_monitor.tolerances import UNIT_QUATERNION
 
@@ -45,10 +45,10 @@ class KeptSlots:
         kind = kind_of(shape)
         self.is_bounded, self.is_planted = kind.bounded, False
         self.pieces: PosedShapes | None = None
-        if kind.planar or isinstance(shape, Mesh | Points):
+        if kind.planar or isinstance(shape, WITH_TREE):
             found = exact_model(((shape, _HERE),)).pieces
             self.slots = laid_out(found)
-            self.has_mesh = any(isinstance(each, Mesh | Points) for each, _ in found)
+            self.has_mesh = any(isinstance(each, WITH_TREE) for each, _ in found)
             self.is_convex = len(found) == 1 and not self.has_mesh
             # a plane shape, whose pose has to be checked, and several pieces are completed like what is uncertain
             is_answered = len(found) == 1 and isinstance(shape, Mesh)
@@ -95,7 +95,7 @@ class QueryBody:
     @cached_property
     def has_mesh(self) -> bool:
         """Whether it has a concave mesh or a cloud, which trees answer."""
-        return any(isinstance(shape, Mesh | Points) for shape, _ in self.pieces)
+        return any(isinstance(shape, WITH_TREE) for shape, _ in self.pieces)
 
     @cached_property
     def is_concave(self) -> bool:

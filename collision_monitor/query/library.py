@@ -20,6 +20,9 @@ from collision_monitor.shapes.shape_table import TREE, ShapeTableBuilder
 FIRST_CAPACITY: Final = 256
 """Slots of the library before it grows."""
 
+WITH_TREE: Final = (Mesh, Points)
+"""Shapes that are a tree of their surface in the table."""
+
 
 class Slots:
     """Slots of the library, a chain of parts. They are free for other shapes when this object is collected."""
@@ -47,34 +50,43 @@ class Library:
         self._show()
 
     def _show(self) -> None:
-        self.tuples = self._builder.table, self._parts
-        self.arrays: tuple[Any, ...] = (*self._builder.table, *self._parts)
+        """Make the parts as long as the table, and show both to the kernels."""
+        table = self._builder.table
+        if len(self._parts.next) < len(table.kind):
+            larger = make_parts(len(table.kind))
+            enlarge(self._parts, larger)
+            self._parts = larger
+        self.tuples = table, self._parts
+        self.arrays: tuple[Any, ...] = (*table, *self._parts)
 
     def lay_out(self, pieces: Sequence[tuple[Shape, Pose | None]]) -> Slots:
         """Give slots to the pieces of an object, each at its pose in the object's frame; None: at its origin.
 
         Raises UnsupportedError, ShapeError as `ShapeTableBuilder.append` does.
         """
-        trees = [shape_tree(shape) if isinstance(shape, Mesh | Points) else None for shape, _ in pieces]
+        for shape, _ in pieces:
+            if isinstance(shape, WITH_TREE):
+                shape_tree(shape)  # the shape keeps it: no other thread waits for it
+        builder = self._builder
         with self._lock:
             while self._freed:  # terminates: what is freed meanwhile is what is no longer asked about
                 for slot in self._freed.popleft():
-                    self._builder.remove(slot)
+                    builder.remove(slot)
             numbers: list[int] = []
             try:
-                for (shape, pose), tree in zip(pieces, trees, strict=True):
-                    numbers.append(self._builder.append(shape, pose, tree=tree))
+                for shape, pose in pieces:
+                    tree = shape_tree(shape) if isinstance(shape, WITH_TREE) else None
+                    numbers.append(builder.append(shape, pose, tree=tree))
             except BaseException:
                 for slot in numbers:
-                    self._builder.remove(slot)
+                    builder.remove(slot)
                 raise
-            if len(self._parts.next) < len(self._builder.table.kind):
-                larger = make_parts(len(self._builder.table.kind))
-                enlarge(self._parts, larger)
-                self._parts = larger
-            for slot, after, (_, pose) in zip(numbers, [*numbers[1:], -1], pieces, strict=True):
-                self._parts.next[slot], self._parts.placed[slot] = after, pose is not None
-            self._show()
+            if builder.table is not self.tuples[0]:
+                self._show()
+            parts, after = self._parts, -1
+            for slot in reversed(numbers):
+                parts.next[slot], parts.placed[slot] = after, slot in builder.posed
+                after = slot
             return Slots(numbers, self._freed)
 
     def plant(self, pieces: Sequence[tuple[Shape, Pose | None]], slots: Slots) -> None:

@@ -13,6 +13,7 @@ from collision_monitor.errors import InputError, PoseError, ShapeError
 from collision_monitor.meshes.trees.shape_trees import CERTAIN
 from collision_monitor.query.body import kept_slots, plant
 from collision_monitor.shapes.compound import Compound
+from collision_monitor.shapes.matrix_to_pose import matrices_to_poses
 from collision_monitor.shapes.pose import Pose, as_pose
 from collision_monitor.shapes.registry import Shape
 from collision_monitor.tolerances import LARGEST_INPUT, NORMALISED, UNIT_QUATERNION
@@ -79,8 +80,10 @@ def pose_rows(value: Any, name: str) -> Array:
         got = type(value).__name__
         raise PoseError(f"{name}: expected poses as rows (N, 7), or a list of Pose, got {got}") from None
     if found.shape[-2:] == (4, 4):
-        matrices = found.reshape(-1, 4, 4)
-        return np.array([Pose.from_matrix(matrix).numbers for matrix in matrices]).reshape(-1, 7)
+        matrices = np.array(found.reshape(-1, 4, 4), order="C")
+        rows = np.empty((len(matrices), 7))
+        wrong = matrices_to_poses(matrices, rows)
+        return rows if wrong < 0 else np.array([as_pose(matrices[wrong], f"{name}, {wrong}").numbers])
     if found.ndim in (1, 2) and found.shape[-1] == 3:
         found = np.concatenate([np.atleast_2d(found), np.tile([0.0, 0.0, 0.0, 1.0], (found.size // 3, 1))], axis=1)
     rows = checked_rows(found, 7, name, LARGEST_INPUT, PoseError)

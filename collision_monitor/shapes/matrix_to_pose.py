@@ -1,18 +1,17 @@
-"""The position and the quaternion of a homogeneous matrix."""
+"""The positions and the quaternions of homogeneous matrices."""
 
 from __future__ import annotations
 
 from math import inf, sqrt
 from typing import Any
 
-from collision_monitor._jit import kernel
+from collision_monitor._jit import device, kernel
 from collision_monitor._jit.settled import settled
-from collision_monitor.tolerances import LARGEST_INPUT
+from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 
 
-@settled
-@kernel
-def matrix_to_pose(X: Any) -> tuple[float, Any]:
+@device
+def _pose_of(X: Any) -> tuple[float, Any]:
     """How far the upper left (3, 3) of a matrix is from a rotation, and x, y, z, qx, qy, qz, qw of it.
 
     X: (4, 4), or (3, 3) for a position of 0. The first number is the error of the products of its rows, infinite for
@@ -47,3 +46,22 @@ def matrix_to_pose(X: Any) -> tuple[float, Any]:
         if not (is_finite and X[3, 0] == 0.0 and X[3, 1] == 0.0 and X[3, 2] == 0.0 and X[3, 3] == 1.0):
             off = inf
     return off, (px, py, pz, x / length, y / length, z / length, w / length)
+
+
+@settled
+@kernel
+def matrix_to_pose(X: Any) -> tuple[float, Any]:
+    """As `_pose_of`, of one matrix."""
+    return _pose_of(X)
+
+
+@kernel
+def matrices_to_poses(X: Any, rows: Any) -> int:
+    """Write x, y, z, qx, qy, qz, qw of matrices (N, 4, 4) to rows (N, 7). Return the first that is no pose, or -1."""
+    for k in range(len(X)):
+        off, numbers = _pose_of(X[k])
+        if not off <= UNIT_QUATERNION:
+            return k
+        for c in range(7):
+            rows[k, c] = numbers[c]
+    return -1

@@ -269,9 +269,13 @@ def as_pose(value: Any, name: str) -> Pose:
     if isinstance(value, Pose):
         return value
     shape: tuple[int, ...] = ()
-    if isinstance(value, tuple | list | np.ndarray):
+    if isinstance(value, np.ndarray):
+        shape = value.shape
+        if shape == (7,) and type(value) is np.ndarray and value.dtype == np.float64:
+            value = value.tolist()  # Python reads its parts faster
+    elif isinstance(value, tuple | list):
         with contextlib.suppress(ValueError):  # rows of different lengths
-            shape = np.shape(value) if len(value) == 4 or isinstance(value, np.ndarray) else (len(value),)
+            shape = np.shape(value) if len(value) == 4 else (len(value),)
     try:
         if shape == (3,):
             return Pose(value)

@@ -48,7 +48,9 @@ def set_positive(shape: Shape, names: Sequence[str]) -> None:
     known = shape.__dict__
     for name in names:
         value = known[name]
-        if type(value) is not float or not 0.0 < value <= LARGEST_INPUT:  # the text of an error takes longest
+        if (type(value) is float or type(value) is int) and 0.0 < value <= LARGEST_INPUT:
+            known[name] = float(value)
+        else:  # the text of an error takes longest
             known[name] = positive(value, f"{type(shape).__name__} {name.replace('_', ' ')}")
 
 

@@ -6,7 +6,7 @@ The dtypes and the memory order never depend on the content, so that adding a sh
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf, isfinite, nextafter
+from math import inf, nextafter
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -66,7 +66,7 @@ def _empty(slots: int, vertices: int) -> ShapeTable:
         vertices=np.zeros((3, vertices)),
         vertex_index=np.zeros(vertices, np.int32),
         local_position=np.zeros((slots, 3)),
-        local_rotation=np.zeros((slots, 3, 3)),
+        local_rotation=np.tile(_UPRIGHT, (slots, 1, 1)),
         blocks=np.zeros((1, 16, 8)),
     )
 
@@ -106,12 +106,14 @@ def triangle_table(corners: Array) -> ShapeTable:
         vertex_count=np.full(n, LANES, np.int32),
         vertices=np.ascontiguousarray(corners[:, lanes].reshape(-1, 3).T),
         vertex_index=np.tile(lanes, n),
-        local_rotation=np.tile(np.eye(3), (n, 1, 1)),
     )
 
 
 class ShapeTableBuilder:
-    """Builds a ShapeTable. `table` is the current table and must be read again after `append`."""
+    """Builds a ShapeTable. `table` is the current table and must be read again after `append`.
+
+    posed: slots whose local pose may differ from the identity, which the rows of all others hold.
+    """
 
     def __init__(self, slots: int = 64, vertices: int = 512, forest: Forest | None = None) -> None:
         self._forest = forest or Forest()
@@ -122,6 +124,7 @@ class ShapeTableBuilder:
         self._free_blocks: dict[int, list[int]] = {}
         self._blocks: dict[bytes, tuple[int, int]] = {}  # bytes of the points -> start, count
         self._users: dict[int, tuple[bytes, int]] = {}  # start -> key of the block, number of slots that share it
+        self.posed: set[int] = set()
 
     @classmethod
     def restored(cls, table: ShapeTable, free_slots: list[int], free_blocks: dict[int, list[int]]) -> ShapeTableBuilder:
@@ -130,7 +133,7 @@ class ShapeTableBuilder:
         builder = cls()
         table = table._replace(blocks=builder.table.blocks)
         builder.table = _resized(table, max(slots, len(builder.table.kind)), max(vertices, LANES))
-        builder._slots, builder._vertices = slots, vertices
+        builder._slots, builder._vertices, builder.posed = slots, vertices, set(range(slots))
         builder._free_slots, builder._free_blocks = free_slots, free_blocks
         for slot in np.flatnonzero(table.vertex_count):
             start, count = int(table.vertex_start[slot]), int(table.vertex_count[slot])
@@ -175,12 +178,12 @@ class ShapeTableBuilder:
         needed (`meshes.trees.shape_trees`).
         Raises UnsupportedError for a kind without kernels, ShapeError for an invalid margin.
         """
-        if not (isfinite(margin) and margin >= 0.0):
+        if not 0.0 <= margin < inf:
             raise ShapeError(f"margin: expected a finite number of metres >= 0, got {margin!r}")
         kind = kind_of(shape)
         row = kind.row(shape, corners)
         if row is None and tree is not None:
-            row = Row(kind.number, (), float(tree[REACH]), shape.radius if isinstance(shape, Points) else 0.0)
+            row = Row(int(kind.number), (), float(tree[REACH]), shape.radius if isinstance(shape, Points) else 0.0)
         if row is None:
             raise UnsupportedError(f"{type(shape).__name__} has no narrow phase; supported are {SUPPORTED_SHAPES}")
         start, count = (0, 0) if row.ring is None or row.points is None else self._share(row.points, row.ring)
@@ -191,10 +194,14 @@ class ShapeTableBuilder:
         table.margin[slot] = margin
         # rounded up, because the sphere must contain the shape in spite of round-off
         table.radius[slot] = nextafter(row.radius * (1 + 1e-15) + margin, inf)
-        if count or table.vertex_count[slot]:
+        if count:
             table.vertex_start[slot], table.vertex_count[slot] = start, count
-        table.local_position[slot] = 0.0 if pose is None else pose.position
-        table.local_rotation[slot] = _UPRIGHT if pose is None else pose.rotation
+        if pose is not None:
+            table.local_position[slot], table.local_rotation[slot] = pose.position, pose.rotation
+            self.posed.add(slot)
+        elif slot in self.posed:
+            table.local_position[slot], table.local_rotation[slot] = 0.0, _UPRIGHT
+            self.posed.remove(slot)
         table.kind[slot] = row.number
         if tree is not None:
             self.plant(slot, tree)
@@ -208,22 +215,24 @@ class ShapeTableBuilder:
 
     def remove(self, slot: int) -> None:
         """Free a slot for reuse. Raises InputError if it holds no shape."""
-        if not (0 <= slot < self._slots and self.table.kind[slot]):
+        table = self.table
+        kind = table.kind[slot] if 0 <= slot < self._slots else 0
+        if kind == 0:
             raise InputError(f"expected the slot of a shape in the table, got {slot!r}")
-        if self.table.vertex_count[slot]:
-            start = int(self.table.vertex_start[slot])
-            self.table.vertex_start[slot] = 0
+        if table.vertex_count[slot]:
+            start = int(table.vertex_start[slot])
+            table.vertex_start[slot] = 0
             key, users = self._users[start]
             if users > 1:
                 self._users[start] = key, users - 1
             else:
                 del self._users[start], self._blocks[key]
-                self._free_blocks.setdefault(int(self.table.vertex_count[slot]), []).append(start)
-            self.table.vertex_count[slot] = 0
-        if self.table.size[slot, TREE] > 0.0 and self.table.kind[slot] != HALF_SPACE:
-            self._forest.drop(int(self.table.size[slot, TREE]) - 1)
-            self.table.size[slot, TREE] = 0.0
-        self.table.kind[slot] = 0
+                self._free_blocks.setdefault(int(table.vertex_count[slot]), []).append(start)
+            table.vertex_count[slot] = 0
+        if table.size[slot, TREE] > 0.0 and kind != HALF_SPACE:
+            self._forest.drop(int(table.size[slot, TREE]) - 1)
+            table.size[slot, TREE] = 0.0
+        table.kind[slot] = 0
         self._free_slots.append(slot)
 
     def _new_slot(self) -> int:

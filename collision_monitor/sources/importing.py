@@ -112,13 +112,7 @@ def _write(
     left_out |= set() if pipeline.rules.text else {Topic.ALERTS}
     left_out |= set() if feed is not None else {Topic.SOURCES}
     types = {topic.of(): topic.message for topic in RECORDED if topic not in left_out}
-    was_there = target.exists()
-    try:
-        recorder = Recorder(target, types, pipeline.metadata(node=f"/{NODE}"), overwrite=overwrite, patient=True)
-    except SessionError:
-        if not was_there:
-            _remove(target)
-        raise
+    recorder = Recorder(target, types, pipeline.metadata(node=f"/{NODE}"), overwrite=overwrite, patient=True)
     try:
         _feed(first, inputs, feed, pipeline, recorder, result, progress)
     except BaseException:

@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 import collision_monitor as cm
+from collision_monitor.query.pair_arrays import pose_rows
 
 RNG = np.random.default_rng(2)
 TETRAHEDRON = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
@@ -50,6 +51,34 @@ def test_contacts_agree_with_single_calls() -> None:
             found.point_b[k] - found.point_a[k], found.signed_distance[k] * found.normal[k], atol=1e-12
         )
     assert found.overlaps.any() and not found.overlaps.all()
+
+
+def test_matrices_are_the_poses_of_single_calls_to_the_bit() -> None:
+    rows = poses()
+    rows[::2, 3:] = np.eye(4)[np.arange(len(rows[::2])) % 4]  # half turns and none
+    matrices = np.array([pose(row).matrix for row in rows])
+    expected = [cm.Pose.from_matrix(matrix).numbers for matrix in matrices]
+    for given in (matrices, list(matrices), matrices.tolist(), np.asfortranarray(matrices)):
+        assert pose_rows(given, "poses A").tolist() == [list(numbers) for numbers in expected]
+    assert pose_rows(matrices[0], "poses A").tolist() == [list(expected[0])]
+    assert pose_rows(matrices[:0], "poses A").shape == (0, 7)
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "words"),
+    [
+        ((3, 3), 2.0, "the last row 0 0 0 1"),
+        ((1, 3), np.nan, "a finite position"),
+        ((2, 3), 1e300, "a finite position"),
+        ((0, 0), 3.0, "a rotation"),
+        ((0, 0), np.nan, "a rotation"),
+    ],
+)
+def test_a_matrix_that_is_no_pose_is_refused_with_its_number(place: tuple[int, int], value: float, words: str) -> None:
+    matrices = np.tile(np.eye(4), (COUNT, 1, 1))
+    matrices[7][place] = matrices[20][place] = value
+    with pytest.raises(cm.PoseError, match=f"poses B, 7: matrix: expected {words}"):
+        cm.contacts(SHAPES[0], cm.Pose(), SHAPES[1], matrices)
 
 
 def test_one_shape_and_one_pose_apply_to_all_pairs() -> None:

@@ -18,6 +18,7 @@ from collision_monitor.motion.bodies import Parts, chain_radius
 from collision_monitor.motion.motion import quaternion_to_matrix
 from collision_monitor.narrow_phase.contact_row import BOUND, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.pair_pose import PairPose
+from collision_monitor.query.kernel_arguments import set_rotation, tables_of
 from collision_monitor.query.library import LIBRARY
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.shape_table import ShapeTable
@@ -34,10 +35,6 @@ class QueryMemory(threading.local):
 
 MEMORY: Final = QueryMemory()
 
-# The arrays of a table cost 20 ns each as arguments, and 200 ns in a named tuple, so each kernel takes them one by one:
-# those of ShapeTable, of Parts and of Scratch.
-
-
 @settled
 @kernel
 def contact_of_chains(
@@ -51,16 +48,12 @@ def contact_of_chains(
 
     A pose is x, y, z and a unit quaternion. The distance is infinite, without a contact, beyond the limit (m).
     """
-    table = ShapeTable(
+    table, parts, scratch = tables_of(
         kind, size, margin, radius, vertex_start, vertex_count, vertices, vertex_index, local_position, local_rotation,
-        blocks,
+        blocks, next_part, index, placed, rotation, quaternion, out, work, tree, answer, triangle,
     )  # fmt: skip
-    parts = Parts(next_part, index, placed)
-    scratch = Scratch(rotation, quaternion, out, work, tree, answer, triangle)
-    quaternion[0, 0], quaternion[0, 1], quaternion[0, 2], quaternion[0, 3] = ai, aj, ak, aw
-    quaternion_to_matrix(quaternion, 0, rotation[0])
-    quaternion[0, 0], quaternion[0, 1], quaternion[0, 2], quaternion[0, 3] = bi, bj, bk, bw
-    quaternion_to_matrix(quaternion, 0, rotation[1])
+    set_rotation(scratch, ai, aj, ak, aw, rotation[0])
+    set_rotation(scratch, bi, bj, bk, bw, rotation[1])
     p = bx - ax, by - ay, bz - az
     return _contact(table, parts, (np.int32(a), np.int32(b)), (ax, ay, az), p, limit, effort, scratch, row)
 
@@ -117,19 +110,15 @@ def overlap_of_chains(
     bi: float, bj: float, bk: float, bw: float,
 ) -> bool:  # fmt: skip
     """Whether two chains of slots have a point in common. Arguments as for `contact_of_chains`."""
-    table = ShapeTable(
+    table, parts, scratch = tables_of(
         kind, size, margin, radius, vertex_start, vertex_count, vertices, vertex_index, local_position, local_rotation,
-        blocks,
+        blocks, next_part, index, placed, rotation, quaternion, out, work, tree, answer, triangle,
     )  # fmt: skip
-    parts = Parts(next_part, index, placed)
-    scratch = Scratch(rotation, quaternion, out, work, tree, answer, triangle)
     p, reach = (bx - ax, by - ay, bz - az), chain_radius(table, parts, a) + chain_radius(table, parts, b)
     if p[0] * p[0] + p[1] * p[1] + p[2] * p[2] > reach * reach * ROUND_OFF:
         return False
-    quaternion[0, 0], quaternion[0, 1], quaternion[0, 2], quaternion[0, 3] = ai, aj, ak, aw
-    quaternion_to_matrix(quaternion, 0, rotation[0])
-    quaternion[0, 0], quaternion[0, 1], quaternion[0, 2], quaternion[0, 3] = bi, bj, bk, bw
-    quaternion_to_matrix(quaternion, 0, rotation[1])
+    set_rotation(scratch, ai, aj, ak, aw, rotation[0])
+    set_rotation(scratch, bi, bj, bk, bw, rotation[1])
     return chains_overlap(table, parts, np.int32(a), np.int32(b), PairPose(rotation[0], rotation[1], p), scratch)
 
 

@@ -35,6 +35,7 @@ from collision_monitor.motion.motion import MOTION, quaternion_to_matrix
 from collision_monitor.motion.stated_motion import COURSE, REST, Motion
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.query.impact.impact_query import MotionQuery
+from collision_monitor.query.kernel_arguments import set_rotation, tables_of
 from collision_monitor.query.library import LIBRARY, Slots
 from collision_monitor.shapes.registry import BALL
 from collision_monitor.shapes.shape_table import ShapeTable
@@ -127,20 +128,17 @@ def impact_of_chains(
 
     A motion has the numbers of a pose and of a Motion. begin: time (s) before which there is none.
     """
-    table = ShapeTable(
+    table, parts, scratch = tables_of(
         kind, size, margin, radius, vertex_start, vertex_count, vertices, vertex_index, local_position, local_rotation,
-        blocks,
+        blocks, next_part, index, placed, rotation, quaternion, out, work, tree, answer, triangle,
     )  # fmt: skip
-    parts, scratch = Parts(next_part, index, placed), Scratch(rotation, quaternion, out, work, tree, answer, triangle)
     A, B = motion[0], motion[1]
     A.x, A.y, A.z, A.vx, A.vy, A.vz, A.wx, A.wy, A.wz = ax, ay, az, avx, avy, avz, awx, awy, awz
     B.x, B.y, B.z, B.vx, B.vy, B.vz, B.wx, B.wy, B.wz = bx, by, bz, bvx, bvy, bvz, bwx, bwy, bwz
     A.ax, A.ay, A.az, B.ax, B.ay, B.az = aax, aay, aaz, bax, bay, baz
     A.course, A.rest, B.course, B.rest = int(course_a), rest_a, int(course_b), rest_b
-    quaternion[0, 0], quaternion[0, 1], quaternion[0, 2], quaternion[0, 3] = ai, aj, ak, aw
-    quaternion_to_matrix(quaternion, 0, A.rotation)
-    quaternion[0, 0], quaternion[0, 1], quaternion[0, 2], quaternion[0, 3] = bi, bj, bk, bw
-    quaternion_to_matrix(quaternion, 0, B.rotation)
+    set_rotation(scratch, ai, aj, ak, aw, A.rotation)
+    set_rotation(scratch, bi, bj, bk, bw, B.rotation)
     search, chains = ImpactQuery(separation, tolerance, iterations), (np.int32(a), np.int32(b))
     return _first_impact(table, parts, chains, Window(begin, horizon), search, scratch, (motion, event, row))
 

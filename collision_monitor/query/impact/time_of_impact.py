@@ -29,10 +29,10 @@ from collision_monitor.query.impact.impact_kernel import (
 )
 from collision_monitor.query.impact.impact_query import ITERATIONS, MotionQuery, check_query
 from collision_monitor.query.impact.moving_body import MovingBody, check_bounded, moving_body, touching_pieces
+from collision_monitor.query.library import LIBRARY
 from collision_monitor.records import Method
 from collision_monitor.shapes.compound import Compound
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
-from collision_monitor.shapes.reach import reach
 from collision_monitor.shapes.registry import Mesh
 from collision_monitor.tolerances import GJK_TOUCHING
 
@@ -122,8 +122,11 @@ def _impact_of_surfaces(a: MovingBody, b: MovingBody, query: MotionQuery) -> tup
 
 
 def round_off_of(a: QueryBody, b: QueryBody) -> float:
-    """Depth (m) of two objects up to which they only touch."""
-    radii = [float(np.linalg.norm(reach(side.pieces, np.eye(3)))) for side in (a, b)]
+    """Depth (m) of two objects up to which they only touch, as the kernels have it."""
+    table = LIBRARY.tuples[0]
+    radii = []
+    for slots in (a.slots.numbers, b.slots.numbers):
+        radii.append(float((np.linalg.norm(table.local_position[slots], axis=1) + table.radius[slots]).max()))
     return GJK_TOUCHING * sum(radius for radius in radii if radius < inf)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
@@ -73,11 +74,18 @@ class RecordingFiles:
             raise SessionError(
                 f"{path}: splitting and recording on events make several files; expected a folder, a name without .mcap"
             )
+        is_new = self._folder is not None and not self._folder.exists()
         if self._folder is not None:
             _make_folder(self._folder, overwrite)
             self._metadata[RECORDING] = uuid.uuid4().hex
         if self._window is None:
-            self._open(None)
+            try:
+                self._open(None)
+            except BaseException:
+                if self._folder is not None and is_new:
+                    with suppress(OSError):  # somebody else may have put a file there
+                        self._folder.rmdir()
+                raise
 
     @property
     def size(self) -> int:

@@ -16,7 +16,10 @@ from collision_monitor.session.recording.queue_entry import QueueEntry
 
 
 class SessionFile:
-    """A session file being written. definitions: text of each type in types.values(). All methods raise OSError."""
+    """A session file being written. definitions: text of each type in types.values(). All methods raise OSError.
+
+    A file whose beginning cannot be written is removed: nothing could be replayed from it.
+    """
 
     def __init__(
         self,
@@ -44,7 +47,7 @@ class SessionFile:
             }
             self._writer.flush()
         except BaseException:
-            self.close()
+            self.discard()
             raise
 
     @property
@@ -97,3 +100,10 @@ class SessionFile:
         """Close the file as it is."""
         with suppress(OSError):  # a failed write has been reported already
             self._stream.close()
+
+    def discard(self) -> None:
+        """Close the file and remove it, unless the path is a link or a device."""
+        self.close()
+        with suppress(OSError):
+            if self.path.is_file() and not self.path.is_symlink():
+                self.path.unlink()

@@ -69,8 +69,9 @@ def _write(session: Session, found: Sequence[Recorded | RecordedSnapshot], start
                 file.write([QueueEntry(each.topic, each.data, each.log_time, each.publish_time, each.sequence)])
                 count += not each.repeated
         file.finish()
-    finally:
-        file.close()
+    except BaseException:
+        file.discard()
+        raise
     return count
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import hypot, sqrt
-from typing import Any, Final, Self
+from typing import Any, Final
 
 import numpy as np
 
@@ -30,7 +30,7 @@ _DIAGONALS: Final = [(int(min(q[0], q[2])), int(max(q[0], q[2]))) for q in _QUAD
 """The edge between the two triangles of each face, which is no edge of the box."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, init=False)
 class Box(Shape):
     """Box; size: full extents (x, y, z) in m. Zero extents are allowed (a plate, a needle), but not all three.
 
@@ -40,14 +40,10 @@ class Box(Shape):
 
     size: Any
 
-    def __new__(cls, *args: Any, **kwargs: Any) -> Self:
-        """Refuse three numbers in place of one size."""
-        if len(args) > 1:
-            raise ShapeError(f"Box: expected one size, got {len(args)} arguments; write Box((x, y, z))")
-        return super().__new__(cls)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "size", full_extents(self.size, "Box size", "Box((1, 1, 1))"))
+    def __init__(self, size: Any, *others: Any) -> None:
+        if others:  # three numbers in place of one size
+            raise ShapeError(f"Box: expected one size, got {1 + len(others)} arguments; write Box((x, y, z))")
+        self.__dict__["size"] = full_extents(size, "Box size", "Box((1, 1, 1))")
 
     @property
     def corners(self) -> Array:

@@ -321,3 +321,19 @@ def test_what_is_refused(change, error, words):
     arguments = {"shape_a": BOX, "motion_a": still(0, 0, 0), "shape_b": BOX, "motion_b": still(3, 0, 0)} | change
     with pytest.raises(error, match=words):
         time_of_impact(**arguments)
+
+
+def test_impacts_of_a_soup_do_not_read_all_of_its_faces_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(2)
+    corners = 0.4 * rng.normal(size=(200, 1, 3)) + 0.05 * rng.normal(size=(200, 3, 3))
+    soup = cm.Mesh(corners.reshape(-1, 3), np.arange(600).reshape(-1, 3))
+    towards = Motion(Pose((3, 0, 0)), (-2, 0, 0), (0, 0, 0.5))
+    expected = time_of_impact(soup, still(0, 0, 0), soup, towards)
+    assert expected.status == "hit"
+
+    def refused(shape: cm.Mesh) -> None:
+        raise AssertionError("all faces are read")
+
+    monkeypatch.setattr("collision_monitor.shapes.kinds.mesh._used", refused)
+    again = time_of_impact(soup, still(0, 0, 0), soup, towards)
+    assert (again.lower, again.upper) == (expected.lower, expected.upper)

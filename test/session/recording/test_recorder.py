@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 import shutil
 import signal
 import subprocess
@@ -169,6 +170,36 @@ def test_a_full_disk_fails_the_recording_and_not_the_caller(tmp_path: Path) -> N
     assert len(list(session.messages())) >= int(recorded) > 0
     assert "cut off" in session.damage[0]
     assert int(dropped) > 0
+
+
+@pytest.mark.parametrize("name", ["a.mcap", "run"])
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_a_recording_whose_beginning_does_not_fit_on_the_disk_leaves_nothing(
+    tmp_path: Path, name: str, overwrite: bool
+) -> None:
+    other = tmp_path / "other.txt"
+    other.touch()
+    if overwrite:
+        Recorder(tmp_path / name, TYPES, METADATA).close()
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2_000, hard))
+    try:
+        with pytest.raises(SessionError, match="expected to be able to write there, got: File too large"):
+            Recorder(tmp_path / name, TYPES, METADATA, overwrite=overwrite)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert [path for path in tmp_path.rglob("*") if not path.is_dir()] == [other]
+    assert overwrite or list(tmp_path.iterdir()) == [other]
+
+
+def test_a_recording_that_cannot_begin_removes_no_file_that_it_did_not_write(tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    folder.mkdir()
+    (folder / "notes.txt").touch()
+    (folder / "run_0.mcap").mkdir()  # so that the first file cannot be made
+    with pytest.raises(SessionError, match="expected to be able to write there"):
+        Recorder(folder, TYPES, METADATA, overwrite=True)
+    assert sorted(path.name for path in folder.iterdir()) == ["notes.txt", "run_0.mcap"]
 
 
 @pytest.mark.parametrize("name", ["a.mcap", "split"])

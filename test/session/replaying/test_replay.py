@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import resource
 import struct
 from collections.abc import Callable
 from pathlib import Path
@@ -304,3 +305,14 @@ def test_a_difference_comes_with_its_inputs_and_can_be_cut_out(
     assert part.messages == whole.first_message + 1
     assert main(["replay", str(path), "--cut", str(out)]) == 1  # the file exists already
     assert main(["replay", str(path), "--cut", str(out), "--force"]) == Verdict.DIVERGED
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    capsys.readouterr()
+    for size in (2_000, out.stat().st_size - 1_000):  # the beginning does not fit on the disk, or the end
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+        try:
+            code = main(["replay", str(path), "--cut", str(tmp_path / "b.mcap")])
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        assert code == 1
+        assert "expected to be able to write there, got: File too large" in capsys.readouterr().err
+        assert not (tmp_path / "b.mcap").exists()
