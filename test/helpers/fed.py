@@ -11,8 +11,19 @@ from foreign_messages import decoder
 
 from collision_monitor.codec import Change, ObjectStateArray, decode_descriptions, decode_states
 from collision_monitor.pipeline.topics import Topic
+from collision_monitor.records import StateFlag
+from collision_monitor.shapes.pose import rotation_matrix
 from collision_monitor.sources import Feed, Input, RawMessage
 from collision_monitor.sources.ground.mapping import make_mapping
+
+
+def in_world(rows: Any) -> Any:
+    """States (N,) with twists along the world's axes, where they are along the bodies' own."""
+    turned, own = rows.copy(), (rows["flags"] & StateFlag.BODY_TWIST) != 0
+    R = rotation_matrix(rows["quaternion"][own])
+    for name in ("linear", "angular", "acceleration"):
+        turned[name][own] = (R @ rows[name][own][..., None])[..., 0]
+    return turned
 
 
 class Fed:

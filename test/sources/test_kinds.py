@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fed import Fed
+from fed import Fed, in_world
 from foreign_bag import SECOND, START, T, marker, markers, odometry, pose_stamped, transforms
 from foreign_messages import (
     CYLINDER,
@@ -143,26 +143,26 @@ def test_errors_of_yaw_alone_are_flagged(pose: Any, twist: Any, frame: Any, body
 
 def test_states_are_brought_to_the_stamp_of_the_step_along_their_motion() -> None:
     fed = Fed({"cart": {"topic": "/odom", "shape": SPHERE}, "other": {"topic": "/b", "shape": SPHERE}}, rate=10)
-    w = 0.7
+    w, radius = 0.7, 3.0 / 0.7
+
+    def place(t: float) -> tuple[float, float, float]:
+        return radius * math.sin(w * t), radius * (1.0 - math.cos(w * t)), 0.0
+
     for k in range(12):
         t = 0.03 * k
         stamp = START + round(t * SECOND)
         q = (0, 0, math.sin(w * t / 2), math.cos(w * t / 2))
-        fed.give(
-            "/odom",
-            stamp,
-            odometry("map", stamp, (3 * t, 0, 0), q, (3 * math.cos(w * t), -3 * math.sin(w * t), 0), (0, 0, w)),
-        )
+        fed.give("/odom", stamp, odometry("map", stamp, place(t), q, (3, 0, 0), (0, 0, w)))
         fed.give("/b", stamp, pose_stamped("map", stamp - 1_000_000, (0, -2 * (t - 0.001), 0)))
     assert [step.stamp_ns - START for step in fed.steps] == [0, 100_000_000, 200_000_000, 300_000_000]
     for step in fed.steps[1:]:
         t = (step.stamp_ns - START) / SECOND
         cart, other = step.states
-        np.testing.assert_allclose(cart["position"], (3 * t, 0, 0), atol=1e-9)
+        np.testing.assert_allclose(cart["position"], place(t), atol=1e-9)
         np.testing.assert_allclose(cart["quaternion"][2:], (math.sin(w * t / 2), math.cos(w * t / 2)), atol=1e-9)
         np.testing.assert_allclose(other["position"], (0, -2 * t, 0), atol=1e-9)
         np.testing.assert_allclose(other["linear"], (0, -2, 0), atol=1e-9)
-        assert not step.states["flags"].any()
+        assert step.states["flags"].tolist() == [StateFlag.BODY_TWIST, 0]
 
 
 def test_uncertainty_grows_on_the_way_to_the_step() -> None:
@@ -290,10 +290,10 @@ def test_twists_and_covariances_of_tracks_are_turned_from_their_own_axes() -> No
     parked = track(2, (9, 9, 9), linear=(0.3, 0, 0), stationary=True)
     fed = Fed({"traffic": {"topic": "/t"}})
     fed.give("/t", START, tracked_objects("map", START, one, parked))
-    moving, still = fed.rows
+    moving, still = in_world(fed.rows)
     np.testing.assert_allclose(moving["linear"], (0, 5, 0), atol=1e-12)
     np.testing.assert_allclose(moving["acceleration"], (0, 2, 0), atol=1e-12)
-    assert moving["flags"] == StateFlag.ACCELERATION_VALID
+    assert moving["flags"] == StateFlag.ACCELERATION_VALID | StateFlag.STOPS | StateFlag.BODY_TWIST
     assert still["linear"].tolist() == [0, 0, 0]
     assert fed.covariances[0][[0, 3, 5]] == pytest.approx([0.01, 0.04, 0.09])  # the pose's are along the map's axes
     assert fed.covariances[0][[6, 9, 11]] == pytest.approx([0.04, 0.01, 0.09])
@@ -302,7 +302,7 @@ def test_twists_and_covariances_of_tracks_are_turned_from_their_own_axes() -> No
     predicted.give(
         "/t", START, predicted_objects("map", START, track(1, (1, 2, 3), q.as_quat(), (5, 0, 0), predicted=True))
     )
-    np.testing.assert_allclose(predicted.rows[0]["linear"], (0, 5, 0), atol=1e-12)
+    np.testing.assert_allclose(in_world(predicted.rows)[0]["linear"], (0, 5, 0), atol=1e-12)
 
 
 def test_shapes_of_tracks_hold_what_was_measured_and_change_seldom() -> None:

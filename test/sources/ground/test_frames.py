@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from fed import Fed
+from fed import Fed, in_world
 from foreign_bag import SECOND, START, odometry, transforms
 from foreign_messages import track, tracked_objects
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from collision_monitor.records import StateFlag
 from collision_monitor.sources.ground.frames import HISTORY, FrameMotion, FrameTree, MissingFrame
 
 PERIOD = 20_000_000
@@ -85,14 +86,15 @@ def test_a_turning_climbing_object_seen_from_a_turning_driving_robot(seed: int, 
             p, q = pose_of(scene.object_at(when / SECOND))
             message = odometry("sensor", START + when, p, q, scene.object[:3], scene.object[3:])
             fed.give("/odom", START, message)
-            row = fed.steps[-1].states[0]
+            given = fed.steps[-1].states
+            row = in_world(given)[0]
             X, _ = scene.truth(when / SECOND)
             linear, angular = twist_in_world(scene.truth, when / SECOND)
             np.testing.assert_allclose(row["position"], X[:3, 3], atol=1e-9)
             np.testing.assert_allclose(Rotation.from_quat(row["quaternion"]).as_matrix(), X[:3, :3], atol=1e-9)
             np.testing.assert_allclose(row["linear"], linear, atol=1e-9)
             np.testing.assert_allclose(row["angular"], angular, atol=1e-9)
-            assert row["flags"] == 0
+            assert row["flags"] == StateFlag.BODY_TWIST
     assert not fed.refused
 
 
@@ -109,8 +111,9 @@ def test_tracks_seen_from_a_moving_robot_get_their_speed_over_ground() -> None:
         "/tracks", START, tracked_objects("sensor", START + when, track(1, p, q, scene.object[:3], scene.object[3:]))
     )
     linear, angular = twist_in_world(scene.truth, when / SECOND)
-    np.testing.assert_allclose(fed.rows[0]["linear"], linear, atol=1e-9)
-    np.testing.assert_allclose(fed.rows[0]["angular"], angular, atol=1e-9)
+    row = in_world(fed.rows)[0]
+    np.testing.assert_allclose(row["linear"], linear, atol=1e-9)
+    np.testing.assert_allclose(row["angular"], angular, atol=1e-9)
 
 
 @given(st.integers(0, 10_000), st.floats(0.0, 0.04))

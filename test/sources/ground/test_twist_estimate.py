@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from fed import Fed
+from fed import Fed, in_world
 from foreign_bag import SECOND, START, odometry, pose_stamped
 from foreign_messages import track, tracked_objects
 from scipy.spatial.transform import Rotation
@@ -73,7 +73,11 @@ def test_a_velocity_along_the_axes_of_the_body_turns_with_it_to_the_step(kind: s
     assert len(fed.steps) >= 18
     for step in fed.steps[1:]:
         t = (step.stamp_ns - START) / SECOND
-        (row,) = step.states
+        (row,) = in_world(step.states)
+        radius = speed / turn
+        np.testing.assert_allclose(
+            row["position"], (radius * np.sin(turn * t), radius * (1 - np.cos(turn * t)), 0), atol=1e-9
+        )
         tangent = np.array([math.cos(turn * t), math.sin(turn * t), 0])
         np.testing.assert_allclose(row["linear"], speed * tangent, atol=1e-9)
         x_axis = Rotation.from_quat(row["quaternion"]).as_matrix()[:, 0]
