@@ -26,7 +26,7 @@ _VECTORS: Final = ("linear", "angular", "acceleration")
 def moved_states(states: States, seconds: ArrayLike) -> States:
     """Return copies of states (N,) after `seconds` (N,) on their courses; standard deviations and flags stay."""
     moved = np.ascontiguousarray(states).copy()
-    numbers = moved.view(np.float64).reshape(len(moved), -1)
+    numbers = moved.view(np.float64).reshape(len(moved), moved.dtype.itemsize // 8)
     after = np.ascontiguousarray(np.broadcast_to(np.asarray(seconds, np.float64), len(moved)))
     _move(numbers, np.ascontiguousarray(moved["flags"]), after)
     return moved

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from fed import in_world
 from foreign_bag import (
     SECOND,
     START,
@@ -97,7 +98,7 @@ def direct(profile: str = "balanced", steps: int = 60) -> tuple[list[Any], Monit
             row = np.zeros(1, records.STATE)
             row["id"], row["position"], row["quaternion"] = number, position, (0, 0, 0, 1)
             if number == 2:
-                row["linear"], row["angular"] = (2, 0, 0), (0, 0, 0.5)
+                row["linear"], row["angular"], row["flags"] = (2, 0, 0), (0, 0, 0.5), StateFlag.BODY_TWIST
             else:
                 row["flags"] = StateFlag.TWIST_UNKNOWN
             results.append(monitor.step(stamp + delay, row))
@@ -169,7 +170,7 @@ def test_poses_and_twists_come_into_the_frame_of_the_session(tmp_path: Path) -> 
     )
     content = {"frame": "world", "objects": {"cart": {"topic": "/odom", "shape": {"sphere": 1}}}}
     assert import_bag(bag, tmp_path / "a.mcap", make_mapping(content)).whole
-    (row,) = rows_of(tmp_path / "a.mcap")
+    (row,) = in_world(rows_of(tmp_path / "a.mcap"))
     R_WH, R_HO, R_OB = map(Rotation.from_quat, (q_WH, q_HO, q_OB))
     R_WB = R_WH * R_HO * R_OB
     np.testing.assert_allclose(row["position"], p_WH + R_WH.apply(p_HO + R_HO.apply(p_OB)), atol=1e-12)
