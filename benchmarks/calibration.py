@@ -9,6 +9,7 @@ Prints a Markdown table and ends with exit code 1 if a probability is off by mor
     python benchmarks/calibration.py --scenes 1000 --futures 5000 --seed 7
     python benchmarks/calibration.py --near            bodies near each other now, at rest or spinning fast
     python benchmarks/calibration.py --spinning        bodies of 4 cm to 3 m that pass each other and may spin fast
+    python benchmarks/calibration.py --arcs            bodies that drive and turn, so that errors turn their paths too
 """
 
 from __future__ import annotations
@@ -20,12 +21,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 import collision_monitor as cm
-from collision_monitor.records import STATE
+from collision_monitor.records import STATE, StateFlag
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import from_rotation_vector, multiply
 
@@ -64,6 +66,7 @@ class Scene:
     shapes: tuple[Shape, Shape]
     states: tuple[Array, Array]
     sigmas: tuple[Array, Array]
+    arcs: bool = False  # the twists are along the bodies' own axes, and stay so
 
 
 @dataclass(frozen=True)
@@ -150,6 +153,25 @@ def spinning_scene(rng: np.random.Generator) -> Scene:
     return Scene((kinds[0], kinds[1]), (shapes[0], shapes[1]), states, (sigmas, sigmas))
 
 
+def arc_scene(rng: np.random.Generator, level: bool) -> Scene:
+    """Two bodies that drive at up to 2 m/s and turn at up to 1 rad/s, and come near each other; level: in the plane."""
+    names = list(KINDS)
+    kinds = (names[rng.integers(len(names))], names[rng.integers(len(names))])
+    shapes, states = (KINDS[kinds[0]](rng), KINDS[kinds[1]](rng)), []
+    for _ in range(2):
+        turn = np.array([0.0, 0.0, rng.uniform(-np.pi, np.pi)]) if level else rng.normal(0, 1, 3)
+        axis = np.array([0.0, 0.0, 1.0]) if level else rng.normal(0, 0.6, 3)
+        linear = np.array([rng.uniform(0.2, 2.0), 0.0, 0.0])
+        states.append(np.concatenate([np.zeros(3), from_rotation_vector(turn), linear, axis * rng.uniform(-1.0, 1.0)]))
+    one, other = (cm.Motion(cm.Pose(s[:3], s[3:7]), s[7:10], s[10:], frame="body") for s in states)
+    t = rng.uniform(0.4, 2.2)
+    beside = rng.normal(0, 0.7, 3) * (1.0, 1.0, 0.0 if level else 1.0)
+    states[1][:3] = one.at(t).position - other.at(t).position + beside
+    most = rng.choice([0.05, 0.2]) * np.array([1.0, 0.5, 1.0, 0.5])
+    sigmas = most * rng.uniform(0.1, 1, 4), most * rng.uniform(0.1, 1, 4)
+    return Scene(kinds, shapes, (states[0], states[1]), sigmas, arcs=True)
+
+
 def predicted(scene: Scene, profile: Profile) -> tuple[np.void | None, bool, float]:
     """The monitor's prediction of the pair or None, whether the pair touches now, and the cost of uncertainty.
 
@@ -168,6 +190,7 @@ def predicted(scene: Scene, profile: Profile) -> tuple[np.void | None, bool, flo
             rows["linear"][k], rows["angular"][k] = state[7:10], state[10:]
             for name, sigma in zip(UNCERTAIN, scene.sigmas[k], strict=True):
                 rows[f"{name}_stddev"][k] = 0.0 if certain else sigma
+        rows["flags"] = StateFlag.BODY_TWIST if scene.arcs else 0
         result = monitor.step(0, rows)
         took = []
         for k in range(20):
@@ -189,7 +212,8 @@ def impact_times(scene: Scene, futures: int, rng: np.random.Generator) -> Array:
         poses = np.column_stack([state[:3] + off[0], turned])
         motions.append((poses, np.column_stack([state[7:10] + off[2], state[10:] + off[3]])))
     a, b = scene.shapes
-    answers = cm.time_of_impact_batch(a, *motions[0], b, *motions[1], HORIZON, tolerance=1e-5)
+    frame: Literal["body", "world"] = "body" if scene.arcs else "world"
+    answers = cm.times_of_impact(a, *motions[0], b, *motions[1], HORIZON, tolerance=1e-5, frame=frame)
     return np.where(answers.status == "clear", inf, answers.lower)
 
 
@@ -305,6 +329,7 @@ def main() -> int:
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--near", action="store_true", help="bodies near each other now, at rest or spinning fast")
     which.add_argument("--spinning", action="store_true", help="bodies of 4 cm to 3 m that pass and may spin fast")
+    which.add_argument("--arcs", action="store_true", help="bodies that drive and turn")
     parser.add_argument("--png", type=Path)
     args = parser.parse_args()
     profile = Profile.named(args.profile).replace(horizon=HORIZON)
@@ -317,6 +342,8 @@ def main() -> int:
             scene = near_scene(rng)
         elif args.spinning:
             scene = spinning_scene(rng)
+        elif args.arcs:
+            scene = arc_scene(rng, level=len(rows) % 2 == 0)
         else:
             scene = random_scene(rng, turning=len(rows) % 2 == 1)
         row = compare(scene, profile, args.futures, rng)
