@@ -11,6 +11,9 @@ unexport PYTHONPATH
 endif
 unexport PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
 
+# Without bytecode beside the sources every process would compile what it imports: half a second for a node.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: help setup setup-demo interfaces demo test test-core test-fast coverage lint format docs fuzz fuzz-files soak bench bench-peers clean
 .DEFAULT_GOAL := help
 

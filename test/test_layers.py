@@ -5,6 +5,8 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from collections.abc import Mapping, Set
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
 from pathlib import Path
@@ -84,7 +86,8 @@ def floor(name: str) -> int | None:
     return next((height for height, names in enumerate(FLOORS) if name in names), None)
 
 
-def imported(path: Path) -> set[str]:
+@cache
+def imported(path: Path) -> frozenset[str]:
     """Modules of this package that a source file imports, also in functions and for type checkers only."""
     found = set()
     for node in ast.walk(ast.parse(path.read_text())):
@@ -94,22 +97,26 @@ def imported(path: Path) -> set[str]:
             assert not node.level, f"{path}, line {node.lineno}: expected an import by its full name"
             members = {f"{node.module}.{alias.name}" for alias in node.names}
             found |= {member if member in FILES else str(node.module) for member in members}
-    return {name for name in found if name.split(".")[0] == NAME}
+    return frozenset(name for name in found if name.split(".")[0] == NAME)
 
 
-@pytest.mark.parametrize("module", FILES)
-def test_imports_point_down(module: str) -> None:
-    own = top(module)
-    height = floor(own)
-    assert height is not None, f"{module} is on no floor: add {own} to FLOORS"
-    for other in sorted(imported(FILES[module])):
-        below = floor(top(other))
-        assert below is not None, f"{module} imports {other}, which is on no floor"
-        is_inside = top(other) == own or (module.removeprefix(f"{NAME}."), top(other)) in SIDEWAYS
-        assert below < height or is_inside, f"{module} imports {other}, which is not below it"
+def test_each_module_is_on_a_floor() -> None:
+    assert {top(module) for module in FILES if floor(top(module)) is None} == set(), "add them to FLOORS"
 
 
-def circle(imports: dict[str, set[str]]) -> list[str]:
+def test_imports_point_down() -> None:
+    wrong = []
+    for module, path in FILES.items():
+        own = top(module)
+        for other in sorted(imported(path)):
+            height, below = floor(own), floor(top(other))
+            is_inside = top(other) == own or (module.removeprefix(f"{NAME}."), top(other)) in SIDEWAYS
+            if height is None or below is None or not (below < height or is_inside):
+                wrong.append(f"{module} imports {other}, which is not below it")
+    assert wrong == []
+
+
+def circle(imports: Mapping[str, Set[str]]) -> list[str]:
     """Return modules each of which imports the next one, and the first one again at the end; empty: there are none."""
     try:
         TopologicalSorter(imports).prepare()
@@ -152,9 +159,9 @@ def test_the_picture_of_the_floors_shows_every_folder() -> None:
     assert drawn == folders, "change FLOORS in docs/draw_architecture.py and run it"
 
 
-@pytest.mark.parametrize("module", FILES)
-def test_the_import_graph_that_names_kernels_and_recordings_is_that_of_python(module: str) -> None:
-    assert direct_imports(module) == imported(FILES[module])
+def test_the_import_graph_that_names_kernels_and_recordings_is_that_of_python() -> None:
+    ours = {module: direct_imports(module) for module in FILES}
+    assert ours == {module: imported(path) for module, path in FILES.items()}
 
 
 def test_all_but_the_node_and_the_command_line_imports_without_ros() -> None:

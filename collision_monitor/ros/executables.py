@@ -84,8 +84,7 @@ def _guard(stop: StopRequest) -> None:
     try:
         spin(node, stop)
     finally:
-        node.stop()
-        node.destroy_node()
+        node.close()
 
 
 def _world(stop: StopRequest) -> None:

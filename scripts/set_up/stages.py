@@ -11,6 +11,7 @@ import time
 import tomllib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import IO, Any
 
@@ -257,6 +258,12 @@ def _install_package(ros: machine.RosInstall | None, log: IO[str]) -> None:
 
 
 def _kernel_inputs(ros: machine.RosInstall | None) -> str:
+    return _kernel_digest()
+
+
+@cache
+def _kernel_digest() -> str:
+    """Digest of the sources as this process first found them, so that a change while kernels compile is noticed."""
     return _digest(files=compiled_sources())
 
 
@@ -268,6 +275,8 @@ def compiled_sources() -> list[Path]:
     found, queue = set(), [ROOT / PACKAGE / "warm_up.py"]
     while queue:
         path = queue.pop()
+        if path in found:
+            continue
         found.add(path)
         for module, names in _IMPORT.findall(path.read_text()):
             base = ROOT.joinpath(*module.split("."))

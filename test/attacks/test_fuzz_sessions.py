@@ -15,7 +15,7 @@ from collision_monitor.session import Session
 from collision_monitor.session.mcap.layout import HEAD, MESSAGE
 from collision_monitor.session.mcap.salvage import salvage
 
-FILES = 300
+FILES = 100
 
 
 @pytest.fixture(scope="module")

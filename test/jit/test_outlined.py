@@ -55,14 +55,20 @@ for name in sys.argv[1:]:
 """
 
 
-@pytest.fixture
-def run(tmp_path: Path) -> Run:
-    (tmp_path / "example.py").write_text(MODULE)
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of the module and of the caches."""
+    folder = tmp_path_factory.mktemp("outlined")
+    (folder / "example.py").write_text(MODULE)
+    return folder
 
+
+@pytest.fixture(scope="module")
+def run(folder: Path) -> Run:
     def run(cache: str, *names: str) -> list[str]:
         """Names of the functions that were compiled, and results of the kernels."""
-        path = os.pathsep.join([str(tmp_path), *filter(None, sys.path)])
-        environment = {**os.environ, "PYTHONPATH": path, "NUMBA_CACHE_DIR": str(tmp_path / cache)}
+        path = os.pathsep.join([str(folder), *filter(None, sys.path)])
+        environment = {**os.environ, "PYTHONPATH": path, "NUMBA_CACHE_DIR": str(folder / cache)}
         command = [sys.executable, "-c", PROGRAM, *names]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=120)
         assert done.returncode == 0, done.stderr
@@ -71,24 +77,32 @@ def run(tmp_path: Path) -> Run:
     return run
 
 
-def test_an_outlined_function_is_compiled_once_and_loaded_with_its_callers(run: Run, tmp_path: Path) -> None:
-    assert run("one", "direct", "nested") == ["direct", "core", "6.0", "nested", "above", "through", "15.0"]
+@pytest.fixture(scope="module")
+def first(run: Run) -> list[str]:
+    """What the first process compiled and answered."""
+    return run("one", "direct", "nested")
+
+
+def test_an_outlined_function_is_compiled_once_and_loaded_with_its_callers(
+    run: Run, folder: Path, first: list[str]
+) -> None:
+    assert first == ["direct", "core", "6.0", "nested", "above", "through", "15.0"]
     assert run("one", "nested", "direct") == ["15.0", "6.0"]
-    assert len(list(tmp_path.glob("one/*/core-*.outlined"))) == 1
+    assert len(list(folder.glob("one/*/core-*.outlined"))) == 1
 
 
-def test_a_lost_file_of_an_outlined_function_costs_only_its_own_compilation(run: Run, tmp_path: Path) -> None:
-    run("one", "direct", "nested")
-    (lost,) = tmp_path.glob("one/*/core-*.outlined")
+def test_a_lost_file_of_an_outlined_function_costs_only_its_own_compilation(
+    run: Run, folder: Path, first: list[str]
+) -> None:
+    (lost,) = folder.glob("one/*/core-*.outlined")
     lost.unlink()
     assert run("one", "nested", "direct") == ["core", "15.0", "6.0"]
     assert run("one", "nested", "direct") == ["15.0", "6.0"]
 
 
-def test_kernels_call_code_that_another_process_compiled(run: Run, tmp_path: Path) -> None:
+def test_kernels_call_code_that_another_process_compiled(run: Run, folder: Path, first: list[str]) -> None:
     """Two processes that compile at the same time both write the file, and the last one stays."""
-    run("one", "direct", "nested")
     run("two", "nested")  # in another order, so that numba counts its functions otherwise
-    (one,), (two,) = (tmp_path.glob(f"{cache}/*/core-*.outlined") for cache in ("one", "two"))
+    (one,), (two,) = (folder.glob(f"{cache}/*/core-*.outlined") for cache in ("one", "two"))
     one.write_bytes(two.read_bytes())
     assert run("one", "direct", "nested") == ["6.0", "15.0"]

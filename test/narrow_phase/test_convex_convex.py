@@ -194,7 +194,7 @@ def as_polygon(shape, R, p, sides):
 def test_sphere_against_cylinder_and_cone_by_the_definition():
     rng = np.random.default_rng(16)
     sides = 400
-    for _ in range(60):
+    for _ in range(25):
         radius, height, r = rng.uniform(0.2, 1, 3)
         R, p = rotation(rng), rng.normal(size=3) * 0.8
         for shape in (Cylinder(radius, height), Cone(radius, height)):

@@ -118,6 +118,18 @@ class Team:
         while time.monotonic() < deadline:
             self._executor.spin_once(timeout_sec=0.05)
 
+    def settle(self, quiet: float = 1.2) -> None:
+        """Listen until the monitor lives and has made no step for so long (s): longer than the period of the status."""
+        steps: list[int] = []
+
+        def is_quiet() -> bool:
+            heard = len(self.statuses)
+            self.listen(quiet)
+            steps.append(self.statuses[-1].step)
+            return len(self.statuses) > heard and len(steps) > 1 and steps[-1] == steps[-2]
+
+        self.until(is_quiet, START)
+
     def meet(self) -> None:
         """Wait until the monitor and the team have discovered each other."""
         self.until(
@@ -183,6 +195,15 @@ def start(ros_domain_id: int, tmp_path: Path) -> Iterator[Callable[..., Process]
     yield start_process
     for process in started:
         process.kill()
+
+
+@pytest.fixture
+def signals() -> Iterator[None]:
+    """Restore the handlers that a main function takes over."""
+    kept = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    yield
+    for number, handler in kept.items():
+        signal.signal(number, handler)
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""2,000 hostile messages to a node in its own process, over DDS, and a known scene between them."""
+"""1,000 hostile messages to a node in its own process, over DDS, and a known scene between them."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 from dds_campaign import BATCH, attack_node
 
-MESSAGES = 2000
+MESSAGES = 1000
 
 
 def test_no_message_over_dds_kills_a_node_or_changes_its_answers_to_a_known_scene(

@@ -85,7 +85,7 @@ def test_a_robot_over_dds(start: Callable[..., Any], team: Any, tmp_path: Path) 
     for k, (topic, kind, content) in enumerate(played()):
         publishers[topic].publish(cdr(kind, content))
         time.sleep(0.3 if k < 5 else 0.04)  # the first ones find the code cold; they must not wait beside each other
-    team.listen(0.5)
+    team.settle()
     assert process.stop() == 0, process.words
 
     feed = Feed(load_mapping(tmp_path / "sources.yaml"), Decoder(definitions()))

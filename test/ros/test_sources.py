@@ -148,7 +148,7 @@ def compare_with_import(
     team.until(lambda: team.statuses, 60.0)
     player.wait(team)
     player.play()
-    team.listen(0.5)
+    team.settle()
     assert process.stop() == 0, process.words
     bag = write_bag(folder / "bag", messages)
     imported = import_bag(bag, folder / "imported.mcap", load_mapping(folder / "sources.yaml"))

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from collision_monitor.cli.main import main
 from collision_monitor.errors import InputError, SessionError, UnsupportedError
 from collision_monitor.session.many_sessions import ENDED, Engine, find_sessions, for_each
 
@@ -96,21 +97,22 @@ def test_sessions_are_found_by_name_wildcard_and_folder(tmp_path: Path) -> None:
         find_sessions([str(tmp_path / "empty")])
 
 
-def test_replay_takes_many_sessions(recorded: Path, tmp_path: Path) -> None:
+def test_replay_takes_many_sessions(recorded: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for k in range(3):
         (tmp_path / f"{k}.mcap").write_bytes(recorded.read_bytes())
     (tmp_path / "1.mcap").write_bytes(b"no session")
 
-    def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-        command = [Path(sys.executable).with_name("collision-monitor"), "replay", *map(str, arguments)]
-        return subprocess.run(command, capture_output=True, text=True, timeout=120)
+    def run(*arguments: object) -> tuple[int, str]:
+        return main(["replay", *map(str, arguments)]), capsys.readouterr().out
 
-    one, two = run(tmp_path, "--jobs", 1), run(tmp_path, "--jobs", 2)
-    assert one.returncode == two.returncode == 1
-    assert one.stdout == two.stdout
-    assert [line.split(": ")[1].split(",")[0] for line in one.stdout.splitlines() if not line.startswith(" ")] == [
+    command = [Path(sys.executable).with_name("collision-monitor"), "replay", tmp_path, "--jobs", "2"]
+    two = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    code, one = run(tmp_path, "--jobs", 1)
+    assert code == two.returncode == 1
+    assert one == two.stdout
+    assert [line.split(": ")[1].split(",")[0] for line in one.splitlines() if not line.startswith(" ")] == [
         "identical",
         "cannot be read",
         "identical",
     ]
-    assert run(tmp_path / "0.mcap", tmp_path / "2.mcap", "--json").returncode == 0
+    assert run(tmp_path / "0.mcap", tmp_path / "2.mcap", "--json", "--jobs", 1)[0] == 0

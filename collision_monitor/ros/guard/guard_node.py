@@ -15,6 +15,7 @@ from typing import Any, Final
 from geometry_msgs.msg import Twist, TwistStamped
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import String
@@ -34,6 +35,9 @@ from collision_monitor.ros.parameters import begin_node
 
 PERIOD: Final = 0.05
 """s between two looks at the age of everything; a held stop is repeated so often."""
+
+LAST_STOP: Final = 1.0
+"""s that the end waits at most until the base has the last stop. A process has to end 2 s after a signal."""
 
 
 class GuardNode(Node):
@@ -117,6 +121,12 @@ class GuardNode(Node):
         """Publish a command to stand in place of the last one, if there is one."""
         if self._command is not None:
             self._out.publish(stopped(self._command, self.get_clock().now().to_msg()))
+
+    def close(self) -> None:
+        """Stop the base and leave. A message that nobody acknowledged yet would be lost with its publisher."""
+        self.stop()
+        self._out.wait_for_all_acked(Duration(seconds=LAST_STOP))
+        self.destroy_node()
 
     def _decide(self) -> Decision:
         """Return what to do with the last command now. An error of the guard itself is a reason to stop."""

@@ -9,6 +9,7 @@ from geometry_msgs.msg import PoseStamped, Twist, TwistStamped
 from nav_msgs.msg import Odometry
 
 from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.ros import executables
 from collision_monitor.shapes.registry import Cylinder
 from test.ros.guard.conftest import RULES, Base, row
 
@@ -36,11 +37,14 @@ def test_commands_pass_and_stop_at_an_obstacle_and_without_answers(start, team, 
     monitor.kill()
     base.drive(0.4, lambda: base.last() == 0.0)
     base.passed.clear()
-    team.listen(1.5)  # without commands there is one stop, and then nothing
+
+    def quiet():
+        count = len(base.passed)
+        team.listen(0.5)
+        return count and len(base.passed) == count
+
+    team.until(quiet)  # without commands there is one stop, and then nothing
     assert base.last() == 0.0
-    count = len(base.passed)
-    team.listen(0.5)
-    assert len(base.passed) == count
     process.send_signal(signal.SIGINT)
     assert process.wait(10.0) == 0
 
@@ -97,7 +101,6 @@ def test_a_monitor_without_rules_stops_the_robot(start, team, base, guard):
 @pytest.mark.parametrize(
     ("given", "said"),
     [
-        ([], "parameter robot: expected the name of the robot's object"),
         (["robot:=[]"], "parameters: expected a value with a type for each, got an empty list"),
         (["robot:=' , '"], "parameter robot: expected the name of the robot's object"),
         (["robot:=7"], "parameter robot: expected a text or a list of texts, got 7"),
@@ -108,6 +111,11 @@ def test_a_monitor_without_rules_stops_the_robot(start, team, base, guard):
         (["robto:=r"], "parameter 'robto' is unknown: did you mean 'robot'?"),
     ],
 )
-def test_impossible_parameters_are_refused(guard, given, said, tmp_path):
-    assert guard(*given).wait(60.0) == 2
-    assert said in (tmp_path / "guard_0.txt").read_text()
+def test_impossible_parameters_are_refused(ros_domain_id, signals, capfd, given, said):
+    assert executables.guard(["guard", "--ros-args", *(word for each in given for word in ("-p", each))]) == 2
+    assert said in capfd.readouterr().err
+
+
+def test_a_process_without_parameters_is_refused(guard, tmp_path):
+    assert guard().wait(60.0) == 2
+    assert "parameter robot: expected the name of the robot's object" in (tmp_path / "guard_0.txt").read_text()

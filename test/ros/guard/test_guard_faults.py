@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 import signal
+import subprocess
+import sys
+import time
 
 import pytest
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -50,8 +53,27 @@ def test_a_robot_that_no_rule_covers_stands_until_one_does(start, team, base, gu
     team.until(lambda: base.hears("slows down: what the rules see ahead allows 1.37 m/s"))
 
 
-def test_commands_that_are_not_finite_or_of_another_time_stop(start, team, stamped_base, guard, tmp_path):
-    base = stamped_base
+LISTENER = """
+import rclpy
+from geometry_msgs.msg import TwistStamped
+rclpy.init()
+node = rclpy.create_node("listener")
+node.create_subscription(TwistStamped, "/cmd_vel_out", lambda m: print(m.twist.linear.x, flush=True), 10)
+rclpy.spin(node)
+"""
+
+
+@pytest.fixture
+def slow_base(ros_domain_id, tmp_path):
+    """A base in a process of its own, and the speeds (m/s) that it has received."""
+    speeds = tmp_path / "speeds"
+    with speeds.open("w") as out, subprocess.Popen([sys.executable, "-c", LISTENER], stdout=out) as process:
+        yield process, lambda: [float(line) for line in speeds.read_text().splitlines()]
+        process.kill()
+
+
+def test_commands_that_are_not_finite_or_of_another_time_stop(start, team, stamped_base, slow_base, guard, tmp_path):
+    base, (slow, received) = stamped_base, slow_base
     (tmp_path / "rules.yaml").write_text(NAMED)
     process = guard("robot:=turtlebot", "max_age:=1.0", "stamped:=true")
     start("run", "--rules", "rules.yaml")
@@ -81,11 +103,14 @@ def test_commands_that_are_not_finite_or_of_another_time_stop(start, team, stamp
     base.passed.clear()
     base.drive_by(lambda: base.publish(given), lambda: base.passed and base.last() == 0.5, FAR)
     assert base.passed[-1].header == given.header
+    base.drive(0.5, lambda: base.last() == 0.5 and received()[-1:] == [0.5], FAR)
+    slow.send_signal(signal.SIGSTOP)
     base.drive(0.5, lambda: base.last() == 0.5, FAR)
-    process.send_signal(signal.SIGINT)  # its last word is a stop
+    process.send_signal(signal.SIGINT)  # its last word is a stop, also for a base that takes no messages at the moment
+    time.sleep(0.3)
+    slow.send_signal(signal.SIGCONT)
     assert process.wait(10.0) == 0
-    team.listen(0.5)
-    assert base.last() == 0.0
+    team.until(lambda: base.last() == 0.0 and received()[-1] == 0.0)
 
 
 def test_late_states_stop_the_robot(start, team, base, guard, tmp_path):

@@ -16,6 +16,7 @@ from processor_time import within
 from rosbags.highlevel import AnyReader
 from session_scene import record
 
+from collision_monitor.cli.main import main
 from collision_monitor.errors import SessionError
 from collision_monitor.session import Session
 from collision_monitor.session.mcap.layout import SALVAGE
@@ -264,29 +265,29 @@ def test_a_later_file_of_a_recording_begins_where_it_begins(tmp_path: Path) -> N
     assert (result.messages, result.losses, result.notes) == (10, [], [])
 
 
-def test_the_command(tmp_path: Path) -> None:
+def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     whole = write(tmp_path / "whole.mcap")
 
-    def run(*arguments: object) -> subprocess.CompletedProcess[str]:
-        command = [PROGRAM, "salvage", *map(str, arguments)]
-        return subprocess.run(command, capture_output=True, text=True, timeout=60)
+    def run(*arguments: object) -> tuple[int, str, str]:
+        return main(["salvage", *map(str, arguments)]), *capsys.readouterr()
 
     out = tmp_path / "out.mcap"
-    assert run(whole, "-o", out).returncode == 0
-    again = run(whole, "-o", out)
-    assert again.returncode == 1
-    assert "expected a new file" in again.stderr
+    assert run(whole, "-o", out)[0] == 0
+    code, _, error = run(whole, "-o", out)
+    assert code == 1
+    assert "expected a new file" in error
     (tmp_path / "cut.mcap").write_bytes(whole.read_bytes()[:1000])
-    lossy = run(tmp_path / "cut.mcap", "-o", out, "--force")
+    command = [PROGRAM, "salvage", tmp_path / "cut.mcap", "-o", out, "--force"]
+    lossy = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert lossy.returncode == 3
     assert "lost " in lossy.stdout and "was not closed" in lossy.stdout
     for name, content in (("empty.mcap", b""), ("text.mcap", b"hello\n" * 1000), ("zero.mcap", bytes(100_000))):
         (tmp_path / name).write_bytes(content)
-        answer = run(tmp_path / name, "-o", tmp_path / "none.mcap")
-        assert answer.returncode == 1
-        assert answer.stderr.count("\n") == 1
+        code, _, error = run(tmp_path / name, "-o", tmp_path / "none.mcap")
+        assert code == 1
+        assert error.count("\n") == 1
         assert not (tmp_path / "none.mcap").exists()
-    assert run(whole, "-o", whole, "--force").returncode == 1
+    assert run(whole, "-o", whole, "--force")[0] == 1
     assert len(messages(whole)) == 12
 
 
