@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf
 from typing import Any
 
-from collision_monitor._jit import device, inlined, outlined
+from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.vector import Vector, minus, scaled
 from collision_monitor.motion.course import STRAIGHT, Place, most_acceleration, place_on, turned_for
 from collision_monitor.motion.motion import Twist, quaternion_to_matrix, turn_quaternion, twist_on
@@ -17,7 +17,7 @@ def age_of(bodies: Any, i: int, now: float) -> float:
     return 0.0 if bodies.static[i] else now - bodies.time[i]
 
 
-@outlined
+@inlined
 def place_now(bodies: Any, i: int, age: float) -> Place:
     """Where body i is `age` seconds after its last state, relative to it."""
     v = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
@@ -59,7 +59,7 @@ def angular_now(bodies: Any, i: int, age: float) -> Vector:
     return rate * w[i, 0], rate * w[i, 1], rate * w[i, 2]
 
 
-@outlined
+@inlined
 def bending_now(bodies: Any, i: int, age: float, ahead: float) -> float:
     """Bound on the acceleration (m/s^2) of body i's origin in `ahead` s, from `age` s after its last state on."""
     v = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
@@ -106,7 +106,7 @@ def relative_velocity_now(bodies: Any, i: int, age_i: float, j: int, age_j: floa
     )
 
 
-@outlined
+@inlined
 def twist_now(bodies: Any, i: int, age: float) -> Twist:
     """How body i moves `age` seconds after its last state."""
     v = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
@@ -115,20 +115,14 @@ def twist_now(bodies: Any, i: int, age: float) -> Twist:
     return twist_on(bodies.course[i], v, w, a, age, bodies.rest[i])
 
 
-@outlined
-def _turned_now(bodies: Any, i: int, age: float) -> float:
-    """Time (s) in which body i turns at its first rate as far as in `age` seconds after its last state."""
-    v = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
-    a = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]
-    return turned_for(bodies.course[i], v, a, age, bodies.rest[i])
-
-
 @inlined
 def quaternion_now(bodies: Any, i: int, age: float, out: Any) -> None:
     """Write the orientation of body i `age` seconds after its last state into out (4,)."""
     wx, wy, wz = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
     if bodies.course[i] != STRAIGHT:
-        age = _turned_now(bodies, i, age)
+        v = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
+        a = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]
+        age = turned_for(bodies.course[i], v, a, age, bodies.rest[i])
     turn_quaternion(bodies.quaternion, i, wx, wy, wz, age, out)
 
 

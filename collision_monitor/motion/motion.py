@@ -312,7 +312,7 @@ def swept_box(bodies: Any, i: int, begin: float, margin: float) -> Region:
     )  # fmt: skip
 
 
-@device
+@outlined
 def _swept_by_pieces(m: Any, begin: float, sweep: float, half: float) -> Region:
     """`swept_box` of a motion that bends: of the chords of its pieces, which leave them by a t^2 / 8 at most."""
     before = position_at(m, begin)
@@ -354,7 +354,7 @@ class Twist(NamedTuple):
     change: Any  # of both, in parts of them per second (1/s); 0 on a straight course
 
 
-@inlined
+@outlined
 def twist_on(kind: int, v: Vector, w: Vector, a: Vector, t: float, rest: float) -> Twist:
     """How a body moves t (s) after its state, see `place_on`."""
     there = place_on(kind, v, w, a, t, rest)
