@@ -139,6 +139,7 @@ def warm_up_functions() -> None:
     from collision_monitor.query.contact.contact import contact
     from collision_monitor.query.contact.contacts import contacts
     from collision_monitor.query.contact.overlap import overlap
+    from collision_monitor.query.impact.contact_intervals import impacts
     from collision_monitor.query.impact.feature_impact import vertex_face_impact
     from collision_monitor.query.impact.time_of_impact import time_of_impact
     from collision_monitor.query.impact.times_of_impact import times_of_impact
@@ -155,6 +156,9 @@ def warm_up_functions() -> None:
     points_within(Points(np.eye(3)), Pose(), ball, Pose())
     time_of_impact(box, Motion(Pose(), angular=(0, 0, 1)), ball, Motion(Pose((3, 0, 0)), acceleration=(-1, 0, 0)))
     time_of_impact(box, Motion(Pose()), box, Motion(Pose((1, 0, 0))))  # they touch
+    turns = Motion(Pose((3, 0, 0)), (-1, 0, 0), (0, 0, 1), frame="body")
+    impacts(box, Motion(Pose()), ball, turns)
+    turns.at(1.0)
     poses = np.array([[0.0, 0, 0, 0, 0, 0, 1], [1.0, 0, 0, 0, 0, 0, 1]])
     contacts(box, poses, ball, poses)
     times_of_impact(box, poses, np.zeros((2, 6)), ball, poses, np.zeros((2, 6)))

@@ -10,7 +10,7 @@ from __future__ import annotations
 from math import inf
 from typing import Any, Final, NamedTuple
 
-from collision_monitor._jit import device, inlined, kernel
+from collision_monitor._jit import device, inlined, kernel, outlined
 from collision_monitor.geometry.vector import Vector
 from collision_monitor.impact.body_impact import ShapePair, Tube, Window, contact_at, shape_impact
 from collision_monitor.impact.impact_record import CLEAR, UNRESOLVED
@@ -34,20 +34,23 @@ class Intervals(NamedTuple):
     status: Any  # (P,) PredictionStatus
 
 
-@device
-def _first_possible(multibody: Any, i: int, j: int, until: float, off: Vector, query: Any, work: Any) -> float:
-    """Return a time in [0, until] before which the bodies cannot touch; off: their deviation (m), a polynomial in t."""
-    table, parts, bodies = multibody
-    A, B = work.motion[0], work.motion[1]
+@outlined
+def _first_possible(
+    table: Any, parts: Any, pair: ShapePair, until: float, off: Vector, query: Any, scratch: Any
+) -> float:
+    """Return a time in [0, until] before which two chains cannot touch; off: their deviation (m), a polynomial in t.
+
+    pair: their motions and first slots.
+    """
+    A, B, first_a, first_b = pair
     first = until
     for segment in range(SEGMENTS):
         begin, end = until * segment / SEGMENTS, until * (segment + 1) / SEGMENTS
         tube = Tube(off[0] + begin * (off[1] + begin * off[2]), off[1] + (begin + end) * off[2])
-        a, first_b = bodies.first_shape[i], bodies.first_shape[j]
-        b = first_b
+        a, b = first_a, first_b
         while a >= 0:
             window = Window(begin, min(end, first))
-            status, t, _, _ = shape_impact(table, parts, ShapePair(A, B, a, b), window, tube, query, work.scratch)
+            status, t, _, _ = shape_impact(table, parts, ShapePair(A, B, a, b), window, tube, query, scratch)
             if status != CLEAR:
                 first = min(first, t)
             a, b = next_pair(parts, first_b, a, b)
@@ -109,7 +112,8 @@ def first_possible_impacts(
         age_i = carry_on(bodies, i, now, work.quaternion, work.motion[0])
         age_j = carry_on(bodies, j, now, work.quaternion, work.motion[1])
         off = _deviation(a_i, age_i, a_j, age_j)
-        found = _first_possible(multibody, i, j, horizon, off, query, work)
+        chains = ShapePair(work.motion[0], work.motion[1], bodies.first_shape[i], bodies.first_shape[j])
+        found = _first_possible(multibody.table, multibody.parts, chains, horizon, off, query, work.scratch)
         if found < horizon:
             first[k] = found
 
@@ -132,7 +136,8 @@ def widen_intervals(
         age_i = carry_on(bodies, i, now, work.quaternion, work.motion[0])
         age_j = carry_on(bodies, j, now, work.quaternion, work.motion[1])
         off = _deviation(a_i, age_i, a_j, age_j)
-        lower[k] = _first_possible(multibody, i, j, lower[k], off, query, work)
+        chains = ShapePair(work.motion[0], work.motion[1], bodies.first_shape[i], bodies.first_shape[j])
+        lower[k] = _first_possible(multibody.table, multibody.parts, chains, lower[k], off, query, work.scratch)
         if upper[k] < inf:
             end = max(horizon, upper[k])
             upper[k] = _first_certain(multibody, i, j, Window(upper[k], end), off, query.margin, work)

@@ -86,7 +86,7 @@ def speed_change(v: Vector, a: Vector) -> float:
     return along / dot(v, v) if along != 0.0 else 0.0
 
 
-@inlined
+@outlined
 def turned_for(kind: int, v: Vector, a: Vector, t: float, rest: float) -> float:
     """Time (s) in which a body turns at its first rate as far as on its course in t (s) after its state."""
     if kind == STRAIGHT:
@@ -172,7 +172,7 @@ def change_on(
     return Change(acceleration, jerk, turning)
 
 
-@device
+@outlined
 def most_acceleration(kind: int, v: Vector, w: Vector, a: Vector, begin: float, end: float, rest: float) -> float:
     """Bound on the acceleration (m/s^2) of a body's origin between two times (s) after its state."""
     if begin >= rest:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from collision_monitor._jit import kernel
 from collision_monitor.motion.bodies import BodyTable
 from collision_monitor.motion.course import STRAIGHT
-from collision_monitor.motion.last_state import age_of, bending_now, position_now, twist_now, velocity_now
+from collision_monitor.motion.last_state import age_of, bending_now, twist_now
 
 Array = NDArray[np.float64]
 
@@ -42,12 +42,9 @@ def _extrapolate(bodies: BodyTable, slots: Any, now: float, ahead: float, found:
         i = slots[k]
         age = age_of(bodies, i, now)
         found.age[k] = age
-        p, v = position_now(bodies, i, age), velocity_now(bodies, i, age)
-        is_straight = bodies.course[i] == STRAIGHT
-        w = (bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2])
-        if not is_straight:
-            w = twist_now(bodies, i, age).angular
+        there, is_straight = twist_now(bodies, i, age), bodies.course[i] == STRAIGHT
         for c in range(3):
-            found.position[k, c], found.velocity[k, c], found.angular[k, c] = p[c], v[c], w[c]
+            found.position[k, c] = bodies.position[i, c] + there.moved[c]
+            found.velocity[k, c], found.angular[k, c] = there.velocity[c], there.angular[c]
             found.acceleration[k, c] = bodies.acceleration[i, c] if is_straight else 0.0
         found.bending[k] = 0.0 if is_straight else bending_now(bodies, i, age, ahead)

@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.broad_phase.region import Region
 from collision_monitor.geometry.vector import Vector, minus, scaled
 from collision_monitor.motion.course import (
@@ -79,6 +79,12 @@ def quaternion_to_matrix(q: Any, i: int, out: Any) -> None:
     out[2, 2] = 1.0 - 2.0 * (x * x + y * y)
 
 
+@outlined
+def turned_at(m: Any, t: float) -> float:
+    """Time (s) in which the motion m (MOTION) turns at its first rate as far as until time t, see `turned_for`."""
+    return turned_for(m.course, (m.vx, m.vy, m.vz), (m.ax, m.ay, m.az), t - m.time, m.rest - m.time)
+
+
 @inlined
 def rotation_at(m: Any, t: float, out: Any) -> None:
     """Write the rotation of the motion m (MOTION) at time t, exp((t - m.time) [w]x) R, into out (3, 3) (Rodrigues).
@@ -87,7 +93,9 @@ def rotation_at(m: Any, t: float, out: Any) -> None:
     """
     R = m.rotation
     rate = sqrt(m.wx * m.wx + m.wy * m.wy + m.wz * m.wz)
-    angle = rate * turned_for(m.course, (m.vx, m.vy, m.vz), (m.ax, m.ay, m.az), t - m.time, m.rest - m.time)
+    angle = rate * (t - m.time)
+    if m.course != STRAIGHT:
+        angle = rate * turned_at(m, t)
     if angle == 0.0:
         for i in range(3):
             for j in range(3):
@@ -105,7 +113,7 @@ def rotation_at(m: Any, t: float, out: Any) -> None:
         out[2, j] = z + s * az + c * (kx * ay - ky * ax)
 
 
-@inlined
+@outlined
 def place_at(m: Any, t: float) -> Place:
     """Where the motion m (MOTION) is at time t, relative to its place at m.time."""
     v, w, a = (m.vx, m.vy, m.vz), (m.wx, m.wy, m.wz), (m.ax, m.ay, m.az)
@@ -136,8 +144,7 @@ def position_at(m: Any, t: float) -> Vector:
 def relative_position(A: Any, B: Any, t: float) -> Vector:
     """Position of motion B relative to motion A at time t (m). Positions are subtracted first, against round-off."""
     if not are_straight(A, B):
-        one, other = place_at(A, t).moved, place_at(B, t).moved
-        return B.x - A.x + (other[0] - one[0]), B.y - A.y + (other[1] - one[1]), B.z - A.z + (other[2] - one[2])
+        return _bent_state(A, B, t).p
     ta, tb = t - A.time, t - B.time
     sa, sb = 0.5 * ta * ta, 0.5 * tb * tb
     return (
@@ -151,7 +158,7 @@ def relative_position(A: Any, B: Any, t: float) -> Vector:
 def relative_velocity(A: Any, B: Any, t: float) -> Vector:
     """Velocity of motion B relative to motion A at time t (m/s)."""
     if not are_straight(A, B):
-        return minus(place_at(B, t).velocity, place_at(A, t).velocity)
+        return _bent_state(A, B, t).v
     ta, tb = t - A.time, t - B.time
     return (
         B.vx - A.vx + (B.ax * tb - A.ax * ta),
@@ -178,16 +185,19 @@ def pair_state(A: Any, B: Any, t: float) -> PairState:
     if are_straight(A, B):
         here = Place((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0)
         return PairState(relative_position(A, B, t), relative_velocity(A, B, t), w_a, w_b, here, here)
+    return _bent_state(A, B, t)
+
+
+@outlined
+def _bent_state(A: Any, B: Any, t: float) -> PairState:
+    """`pair_state` of two motions of which one is not straight."""
     a, b = place_at(A, t), place_at(B, t)
     p = (
         B.x - A.x + (b.moved[0] - a.moved[0]),
         B.y - A.y + (b.moved[1] - a.moved[1]),
         B.z - A.z + (b.moved[2] - a.moved[2]),
     )
-    if A.course != STRAIGHT:
-        w_a = scaled(w_a, a.rate)
-    if B.course != STRAIGHT:
-        w_b = scaled(w_b, b.rate)
+    w_a, w_b = scaled((A.wx, A.wy, A.wz), a.rate), scaled((B.wx, B.wy, B.wz), b.rate)
     return PairState(p, minus(b.velocity, a.velocity), w_a, w_b, a, b)
 
 
@@ -209,7 +219,7 @@ def half_acceleration(A: Any, B: Any, begin: float, end: float) -> float:
     return 0.5 * sqrt(x * x + y * y + z * z)
 
 
-@inlined
+@outlined
 def _most_acceleration(m: Any, begin: float, end: float) -> float:
     v, w, a = (m.vx, m.vy, m.vz), (m.wx, m.wy, m.wz), (m.ax, m.ay, m.az)
     return most_acceleration(m.course, v, w, a, begin - m.time, end - m.time, m.rest - m.time)
@@ -224,10 +234,10 @@ class PairChange(NamedTuple):
     turning_b: Any
 
 
-@inlined
-def _change_at(m: Any, there: Place, t: float, span: float) -> Change:
+@outlined
+def _change_at(m: Any, velocity: Vector, t: float, span: float) -> Change:
     v, w, a = (m.vx, m.vy, m.vz), (m.wx, m.wy, m.wz), (m.ax, m.ay, m.az)
-    return change_on(m.course, v, w, a, t - m.time, m.rest - m.time, span, there.velocity)
+    return change_on(m.course, v, w, a, t - m.time, m.rest - m.time, span, velocity)
 
 
 @inlined
@@ -238,7 +248,7 @@ def change_at(A: Any, B: Any, state: PairState, t: float, span: float) -> PairCh
     """
     if are_straight(A, B):
         return PairChange((B.ax - A.ax, B.ay - A.ay, B.az - A.az), 0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
-    one, other = _change_at(A, state.place_a, t, span), _change_at(B, state.place_b, t, span)
+    one, other = _change_at(A, state.place_a.velocity, t, span), _change_at(B, state.place_b.velocity, t, span)
     return PairChange(
         minus(other.acceleration, one.acceleration), one.jerk + other.jerk, one.turning, other.turning
     )  # fmt: skip
@@ -302,7 +312,7 @@ def swept_box(bodies: Any, i: int, begin: float, margin: float) -> Region:
     )  # fmt: skip
 
 
-@device
+@outlined
 def _swept_by_pieces(m: Any, begin: float, sweep: float, half: float) -> Region:
     """`swept_box` of a motion that bends: of the chords of its pieces, which leave them by a t^2 / 8 at most."""
     before = position_at(m, begin)
@@ -344,7 +354,7 @@ class Twist(NamedTuple):
     change: Any  # of both, in parts of them per second (1/s); 0 on a straight course
 
 
-@inlined
+@outlined
 def twist_on(kind: int, v: Vector, w: Vector, a: Vector, t: float, rest: float) -> Twist:
     """How a body moves t (s) after its state, see `place_on`."""
     there = place_on(kind, v, w, a, t, rest)
@@ -352,7 +362,7 @@ def twist_on(kind: int, v: Vector, w: Vector, a: Vector, t: float, rest: float) 
     return Twist(there.moved, there.velocity, scaled(w, there.rate), change)
 
 
-@inlined
+@outlined
 def twist_at(m: Any, t: float) -> Twist:
     """How the motion m (MOTION) moves at time t."""
     v, w, a = (m.vx, m.vy, m.vz), (m.wx, m.wy, m.wz), (m.ax, m.ay, m.az)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from collision_monitor.errors import PoseError
@@ -115,6 +116,12 @@ class QueryBody:
             return CERTAIN
         known = [kept_tree(shape).inside for shape, _ in self.shapes if isinstance(shape, Mesh)]
         return UNCERTAIN if UNCERTAIN in known else NEVER if NEVER in known else CERTAIN
+
+    @cached_property
+    def radius(self) -> float:
+        """Radius (m) of a sphere about its origin that holds it; infinite for one with a half-space."""
+        table, slots = LIBRARY.tuples[0], self.slots.numbers
+        return float((np.linalg.norm(table.local_position[slots], axis=1) + table.radius[slots]).max())
 
     def plant(self) -> None:
         """Give its convex pieces the trees that their pairs with meshes need."""

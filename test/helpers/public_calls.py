@@ -109,6 +109,11 @@ def _impact(g: np.random.Generator) -> Any:
     return found.status, found.lower, found.upper
 
 
+def _intervals(g: np.random.Generator) -> Any:
+    a, b = two(g)
+    return [(*each.entry, *each.exit) for each in cm.impacts(a, motion(g), b, solid_motion(b, g))]
+
+
 def rows(g: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
     q = g.normal(size=(n, 4))
     poses = np.hstack([g.normal(size=(n, 3)) * 3, q / np.linalg.norm(q, axis=1)[:, None]])
@@ -230,6 +235,7 @@ CALLS: dict[str, Call] = {
     "time_of_impact": _impact,
     "time_of_impact_batch": _batch,
     "times_of_impact": _times,
+    "impacts": _intervals,
     "contains": lambda g: cm.contains(shapes(g)[g.integers(8)], pose(g), g.normal(size=(30, 3))),
     "cast_ray": lambda g: cm.cast_ray(shapes(g)[g.integers(8)], pose(g), *_vectors(g, 2)).distance,
     "points_within": lambda g: cm.points_within(shapes(g)[8], pose(g), shapes(g)[g.integers(8)], pose(g), 0.3),

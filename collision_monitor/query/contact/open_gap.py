@@ -20,6 +20,7 @@ from collision_monitor.query.contact.fillings import fillings
 from collision_monitor.records import Model
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Mesh, Points, kind_of
+from collision_monitor.tolerances import ROUNDED_UP
 
 INSIDE: Final = Location.INSIDE
 
@@ -34,13 +35,22 @@ def inner_points(shapes: PosedShapes) -> NDArray[np.float64]:
         if isinstance(shape, Points):
             own = np.asarray(shape.points)
         elif isinstance(shape, Mesh):
-            faces, part = shape.surface.faces, shape.surface.part
-            own = shape.vertices[faces[np.unique(part, return_index=True)[1], 0] if len(faces) else shape.faces[:1, 0]]
+            own = _first_corners(shape)
         else:
             middle = kind_of(shape).middle
             own = np.zeros((1, 3)) if middle is None else middle(shape)[None]
         found.append(own @ pose.rotation.T + pose.position)
     return np.concatenate(found)
+
+
+def _first_corners(mesh: Mesh) -> NDArray[np.float64]:
+    """A corner of each connected part of a mesh (n, 3), kept with the mesh as its tree is."""
+    known: NDArray[np.float64] | None = mesh.__dict__.get("first_corners")
+    if known is None:
+        faces, part = mesh.surface.faces, mesh.surface.part
+        first = faces[np.unique(part, return_index=True)[1], 0] if len(faces) else mesh.faces[:1, 0]
+        known = mesh.__dict__["first_corners"] = mesh.vertices[first]
+    return known
 
 
 def location_of(a: QueryBody, pose_a: Pose, b: QueryBody, pose_b: Pose) -> tuple[int, int]:
@@ -54,6 +64,8 @@ def location_of(a: QueryBody, pose_a: Pose, b: QueryBody, pose_b: Pose) -> tuple
 def _located(inner: QueryBody, pose: Pose, outer: QueryBody, outer_pose: Pose) -> int:
     found: int = Location.OUTSIDE
     if outer.model is not Model.EXACT:
+        return found
+    if np.linalg.norm(pose.position - outer_pose.position) > (inner.radius + outer.radius) * (1.0 + ROUNDED_UP):
         return found
     points = inner_points(inner.shapes) @ pose.rotation.T + (pose.position - outer_pose.position)
     for shape, at in outer.shapes:

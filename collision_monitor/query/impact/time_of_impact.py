@@ -29,12 +29,15 @@ from collision_monitor.query.impact.impact_kernel import (
 )
 from collision_monitor.query.impact.impact_query import ITERATIONS, MotionQuery, check_query
 from collision_monitor.query.impact.moving_body import MovingBody, check_bounded, moving_body, touching_pieces
-from collision_monitor.query.library import LIBRARY
 from collision_monitor.records import Method
 from collision_monitor.shapes.compound import Compound
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
 from collision_monitor.shapes.registry import Mesh
 from collision_monitor.tolerances import GJK_TOUCHING
+
+FILLED: Final = 1.75
+"""Bound on the radius of the fillings of an open mesh, in radii of the mesh: a box about points in a ball has corners
+that are the root of 3 times as far away."""
 
 DEEPENING_TIMES: Final = 40
 """Times tried for a certain overlap of shapes that touch at the start, each half of the one before: down to 1e-12 of
@@ -123,17 +126,20 @@ def _impact_of_surfaces(a: MovingBody, b: MovingBody, query: MotionQuery) -> tup
 
 def round_off_of(a: QueryBody, b: QueryBody) -> float:
     """Depth (m) of two objects up to which they only touch, as the kernels have it."""
-    table = LIBRARY.tuples[0]
-    radii = []
-    for slots in (a.slots.numbers, b.slots.numbers):
-        radii.append(float((np.linalg.norm(table.local_position[slots], axis=1) + table.radius[slots]).max()))
-    return GJK_TOUCHING * sum(radius for radius in radii if radius < inf)
+    return GJK_TOUCHING * sum(radius for radius in (a.radius, b.radius) if radius < inf)
+
+
+def _are_apart(a: MovingBody, b: MovingBody, query: MotionQuery, larger: float = 1.0) -> bool:
+    """Whether spheres about both origins, larger by a factor, are farther apart than the separation at the start."""
+    between = b.motion.pose.position - a.motion.pose.position
+    reach = larger * (a.body.radius + b.body.radius)
+    return bool(np.linalg.norm(between) > reach + query.separation)
 
 
 def _certain_start(a: MovingBody, b: MovingBody, query: MotionQuery) -> tuple[float, float, Method] | None:
     """The impact of objects of which one is inside the other at the start, or that may be: no depth shows that."""
     method = Method.CONSERVATIVE_ADVANCEMENT
-    if not (a.body.has_mesh or b.body.has_mesh):
+    if not (a.body.has_mesh or b.body.has_mesh) or _are_apart(a, b, query):
         return None
     found = contact(a.body.shapes, a.motion.pose, b.body.shapes, b.motion.pose)
     round_off = round_off_of(a.body, b.body)
@@ -179,11 +185,12 @@ def _sampled_overlap(a: MovingBody, b: MovingBody, query: MotionQuery) -> float:
 def _first_possible_impact(a: MovingBody, b: MovingBody, query: MotionQuery) -> float:
     """First time (s) at which the solids of open meshes may meet; infinite for never."""
     poses = a.motion.pose, b.motion.pose
-    places = location_of(a.body, poses[0], b.body, poses[1])
-    if any(place != Location.OUTSIDE for place in places):
-        return 0.0
-    if least_gap(a.body, poses[0], b.body, poses[1]) < query.separation - round_off_of(a.body, b.body):
-        return 0.0
+    if not _are_apart(a, b, query, FILLED):
+        places = location_of(a.body, poses[0], b.body, poses[1])
+        if any(place != Location.OUTSIDE for place in places):
+            return 0.0
+        if least_gap(a.body, poses[0], b.body, poses[1]) < query.separation - round_off_of(a.body, b.body):
+            return 0.0
     of_a, of_b = fillings(a.body.shapes), fillings(b.body.shapes)
     pairs: list[tuple[PosedShapes, PosedShapes]] = [(of_a, [*b.body.pieces, *of_b]), (a.body.pieces, of_b)]
     first = inf
