@@ -167,7 +167,7 @@ def test_no_step_with_a_budget_is_the_first_to_load_a_kernel(when: str) -> None:
         "from collision_monitor.impact import pair_impacts, sphere_trees\n"
         "limited = Profile(budget_ms=1.0)\n"
         f"monitor = {when}\n"
-        "print(len(pair_impacts.refine.signatures), len(sphere_trees.tighten.signatures))\n"
+        "print(len(pair_impacts.predict_pairs.signatures), len(sphere_trees.tighten.signatures))\n"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=300)
     assert done.stdout.split() == ["1", "1"], done.stderr

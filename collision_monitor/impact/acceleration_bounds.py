@@ -95,36 +95,13 @@ def _deviation(a_i: float, age_i: float, a_j: float, age_j: float) -> Vector:
 
 
 @kernel
-def first_possible_impacts(
-    multibody: Any, spread: Any, pairs: Any, now: float, horizon: float, query: Any, work: Any, first: Any
-) -> None:
-    """Write to first (P,) when pairs (P, 2) of body slots may meet at the earliest (s from now), as their bounds allow.
-
-    Infinite: not within the horizon (s), or no bound is declared.
-    """
-    bodies = multibody.bodies
-    for k in range(pairs.shape[0]):
-        i, j = pairs[k, 0], pairs[k, 1]
-        a_i, a_j = _bound(bodies, spread, i), _bound(bodies, spread, j)
-        first[k] = inf
-        if not a_i + a_j > 0.0:
-            continue
-        age_i = carry_on(bodies, i, now, work.quaternion, work.motion[0])
-        age_j = carry_on(bodies, j, now, work.quaternion, work.motion[1])
-        off = _deviation(a_i, age_i, a_j, age_j)
-        chains = ShapePair(work.motion[0], work.motion[1], bodies.first_shape[i], bodies.first_shape[j])
-        found = _first_possible(multibody.table, multibody.parts, chains, horizon, off, query, work.scratch)
-        if found < horizon:
-            first[k] = found
-
-
-@kernel
 def widen_intervals(
     multibody: Any, spread: Any, intervals: Intervals, now: float, horizon: float, query: Any, work: Any
 ) -> None:
     """Widen intervals (Intervals) by the acceleration bounds that the bodies declare. horizon: s after `now`.
 
-    If a body can avoid contact, the upper end becomes infinite and the status UNRESOLVED.
+    That of a pair that is stated to pass is given as from the horizon on. If a body can avoid contact, the upper end
+    becomes infinite and the status UNRESOLVED.
     """
     bodies = multibody.bodies
     pairs, lower, upper, status = intervals

@@ -9,14 +9,7 @@ from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.impact.body_impact import CLOSING, closing_speed
 from collision_monitor.impact.mesh_pair import SURFACES, shapes_overlap, shapes_within
 from collision_monitor.motion.bodies import next_pair, place_shape
-from collision_monitor.motion.last_state import (
-    age_of,
-    angular_now,
-    position_now,
-    relative_position_now,
-    relative_velocity_now,
-    rotation_now,
-)
+from collision_monitor.motion.last_state import age_of, position_now, relative_state_now, rotation_now
 from collision_monitor.narrow_phase.contact_row import BOUND, CONTACT_SIZE, DISTANCE, NORMAL, POINT_A, POINT_B
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.records import ContactStatus
@@ -48,14 +41,16 @@ class Now(NamedTuple):
     v: Any  # (3,): its velocity (m/s)
     age_i: Any  # s since the last state; 0 for static bodies
     age_j: Any
+    w_i: Any  # (3,): angular velocities (rad/s)
+    w_j: Any
 
 
 @inlined
 def relative_now(bodies: Any, i: int, j: int, time: float) -> Now:
     """Compute body j relative to body i at `time` (s)."""
     age_i, age_j = age_of(bodies, i, time), age_of(bodies, j, time)
-    p = relative_position_now(bodies, i, age_i, j, age_j)
-    return Now(p, relative_velocity_now(bodies, i, age_i, j, age_j), age_i, age_j)
+    p, v, w_i, w_j = relative_state_now(bodies, i, age_i, j, age_j)
+    return Now(p, v, age_i, age_j, w_i, w_j)
 
 
 @inlined
@@ -65,11 +60,9 @@ def widening(now: Now, stale_acceleration: float) -> float:
 
 
 @inlined
-def closing_now(bodies: Any, i: int, j: int, now: Now, row: Any) -> float:
+def closing_now(now: Now, row: Any) -> float:
     """Speed (m/s) at which the witness points of a contact row about body i approach."""
-    return closing_speed(
-        now.v, angular_now(bodies, i, now.age_i), angular_now(bodies, j, now.age_j), now.p, row
-    )  # fmt: skip
+    return closing_speed(now.v, now.w_i, now.w_j, now.p, row)
 
 
 @inlined
@@ -155,7 +148,7 @@ def body_contact(
     best, tests = chains_contact(table, parts, a, b, PairPose(R_i, R_j, now.p), wanted, SURFACES, scratch, result)
     if best == inf:
         return False, tests
-    result[CLOSING] = closing_now(bodies, i, j, now, result)
+    result[CLOSING] = closing_now(now, result)
     excess = bodies.excess[i] + bodies.excess[j]
     result[BOUND] += widen + excess
     certain = best + excess <= query.margin

@@ -11,13 +11,9 @@ from __future__ import annotations
 from math import inf, sqrt
 from typing import Any, Final
 
-import numpy as np
-
-from collision_monitor._jit import device, inlined, kernel, outlined
-from collision_monitor._jit.direct import direct
-from collision_monitor._jit.prefetch import prefetch
+from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.geometry.vector import dot
-from collision_monitor.impact.body_impact import ShapePair, Tube, Window, body_impact, closing_speed, tube_of
+from collision_monitor.impact.body_impact import ShapePair, Tube, Window, closing_speed, tube_of
 from collision_monitor.impact.impact_record import (
     BOUND_ONLY,
     CLEAR,
@@ -28,7 +24,6 @@ from collision_monitor.impact.impact_record import (
 )
 from collision_monitor.impact.mesh_impact import mesh_impact
 from collision_monitor.impact.mesh_pair import SURFACES, has_mesh, shapes_within
-from collision_monitor.impact.pair_impacts import PREFETCH_AHEAD, window_of
 from collision_monitor.impact.sphere_interval import meeting_of_spheres, relative_motion_at, sphere_interval
 from collision_monitor.impact.tree_impact import SearchEnd, tree_approach_at
 from collision_monitor.motion.bodies import place_shape
@@ -141,31 +136,8 @@ def has_bounds(multibody: Any, i: int, j: int) -> bool:
     )
 
 
-@direct
-@kernel
-def predict_coarsely(
-    multibody: Any, pairs: Any, now: float, query: Any, ending: SearchEnd, events: Any, scratch: Any
-) -> tuple[int, int]:
-    """As `predict_pairs`, but with bounds on the impacts of pairs with `has_bounds`. ending: SearchEnd."""
-    bodies = multibody.bodies
-    n = queries = 0
-    for k in range(pairs.shape[0]):
-        ahead = min(k + PREFETCH_AHEAD, pairs.shape[0] - 1)
-        prefetch(bodies.motion, np.intp(pairs[ahead, 0]))
-        prefetch(bodies.motion, np.intp(pairs[ahead, 1]))
-        i, j = pairs[k, 0], pairs[k, 1]
-        window = window_of(bodies, i, j, now)
-        if window.begin > now and window.begin >= window.end:
-            continue
-        is_known = False
-        if has_bounds(multibody, i, j):
-            first, last = _together(bodies.motion[i], bodies.motion[j], window, query.margin)
-            if first > last:
-                continue
-            queries += 1
-            is_known = coarse_impact(multibody, i, j, window, query, ending, scratch, events[n])
-        if not is_known:
-            queries += body_impact(multibody, i, j, window, query, scratch, events[n])
-        if events[n].status != CLEAR:
-            n += 1
-    return n, queries
+@inlined
+def may_meet(A: Any, B: Any, window: Window, margin: float) -> bool:
+    """Whether the bounding spheres of two motions may overlap within a window."""
+    first, last = _together(A, B, window, margin)
+    return first <= last

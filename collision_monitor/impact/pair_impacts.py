@@ -11,9 +11,14 @@ from collision_monitor._jit import inlined, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.impact.body_impact import Window, body_impact, tube_of
+from collision_monitor.impact.coarse_impact import coarse_impact, has_bounds, may_meet
 from collision_monitor.impact.impact_record import BOUND_ONLY, CLEAR, UNRESOLVED, write_pair
 from collision_monitor.impact.sphere_interval import meeting_of_spheres, relative_motion_at, sphere_interval
+from collision_monitor.impact.tree_impact import SearchEnd
 from collision_monitor.motion.motion import half_acceleration
+
+WHOLE, BOUNDS, ANEW = range(3)
+"""Ways to predict pairs, see `predict_pairs`."""
 
 PREFETCH_AHEAD: Final = 4
 """How many pairs ahead the motions of the bodies are prefetched."""
@@ -33,29 +38,6 @@ def window_of(bodies: Any, i: int, j: int, now: float) -> Window:
 def cover_of(bodies: Any, i: int, j: int) -> float:
     """Time until which both bodies are predicted (s)."""
     return min(bodies.motion[i].cover, bodies.motion[j].cover)
-
-
-@direct
-@kernel
-def predict_pairs(multibody: Any, pairs: Any, now: float, query: Any, events: Any, scratch: Any) -> tuple[int, int]:
-    """Write the first impacts of pairs (P, 2) until both bodies' cover times into events (IMPACT).
-
-    The search begins at `now`, or at the time until which the pair was predicted before.
-    Returns (number of impacts, number of distance queries).
-    """
-    n = queries = 0
-    for k in range(pairs.shape[0]):
-        ahead = min(k + PREFETCH_AHEAD, pairs.shape[0] - 1)
-        prefetch(multibody.bodies.motion, np.intp(pairs[ahead, 0]))
-        prefetch(multibody.bodies.motion, np.intp(pairs[ahead, 1]))
-        i, j = pairs[k, 0], pairs[k, 1]
-        window = window_of(multibody.bodies, i, j, now)
-        if window.begin > now and window.begin >= window.end:
-            continue
-        queries += body_impact(multibody, i, j, window, query, scratch, events[n])
-        if events[n].status != CLEAR:
-            n += 1
-    return n, queries
 
 
 @inlined
@@ -90,33 +72,38 @@ def bound_impact(bodies: Any, i: int, j: int, window: Window, margin: float, eve
     meeting_of_spheres(A, B, approach, begin, first, event)
 
 
+@direct
 @kernel
-def bound_pairs(multibody: Any, pairs: Any, now: float, query: Any, events: Any, scratch: Any) -> tuple[int, int]:
-    """As `predict_pairs`, but with `bound_impact` for all pairs that are not cheap."""
+def predict_pairs(
+    multibody: Any, pairs: Any, now: float, query: Any, ending: SearchEnd, how: int, events: Any, scratch: Any
+) -> tuple[int, int]:
+    """Write the first impacts of pairs (P, 2) until both bodies' cover times into events (IMPACT).
+
+    The search begins at `now`, or at the time until which the pair was predicted before. how: WHOLE; BOUNDS, where only
+    the bounding spheres of pairs that are not cheap are compared; ANEW, where it begins at `now`. ending: when the
+    search for the impact of a mesh ends early. Returns (number of impacts, number of distance queries).
+    """
     bodies = multibody.bodies
     n = queries = 0
     for k in range(pairs.shape[0]):
+        ahead = min(k + PREFETCH_AHEAD, pairs.shape[0] - 1)
+        prefetch(bodies.motion, np.intp(pairs[ahead, 0]))
+        prefetch(bodies.motion, np.intp(pairs[ahead, 1]))
         i, j = pairs[k, 0], pairs[k, 1]
-        window = window_of(bodies, i, j, now)
-        if window.begin > now and window.begin >= window.end:
+        window = Window(now, cover_of(bodies, i, j)) if how == ANEW else window_of(bodies, i, j, now)
+        if how != ANEW and window.begin > now and window.begin >= window.end:
             continue
-        if is_cheap(bodies, i, j):
-            queries += body_impact(multibody, i, j, window, query, scratch, events[n])
-        else:
+        is_known = False
+        if how == BOUNDS and not is_cheap(bodies, i, j):
+            is_known = True
             bound_impact(bodies, i, j, window, query.margin, events[n])
-        if events[n].status != CLEAR:
-            n += 1
-    return n, queries
-
-
-@kernel
-def refine(multibody: Any, bounds: Any, now: float, query: Any, events: Any, scratch: Any) -> tuple[int, int]:
-    """Write the first impacts from `now` on of the pairs of `bounds` (IMPACT) into events; as `predict_pairs`."""
-    n = queries = 0
-    for k in range(bounds.size):
-        i, j = bounds[k].i, bounds[k].j
-        window = Window(now, cover_of(multibody.bodies, i, j))
-        queries += body_impact(multibody, i, j, window, query, scratch, events[n])
+        elif ending.tolerance > 0.0 and has_bounds(multibody, i, j):
+            if not may_meet(bodies.motion[i], bodies.motion[j], window, query.margin):
+                continue
+            queries += 1
+            is_known = coarse_impact(multibody, i, j, window, query, ending, scratch, events[n])
+        if not is_known:
+            queries += body_impact(multibody, i, j, window, query, scratch, events[n])
         if events[n].status != CLEAR:
             n += 1
     return n, queries

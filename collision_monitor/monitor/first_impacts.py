@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from typing import Any, Final
@@ -11,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.impact.body_impact import Scratch, make_scratch
-from collision_monitor.impact.coarse_impact import predict_coarsely
 from collision_monitor.impact.impact_record import IMPACT
-from collision_monitor.impact.pair_impacts import bound_pairs, predict_pairs, refine
+from collision_monitor.impact.pair_impacts import ANEW, BOUNDS, WHOLE, predict_pairs
+from collision_monitor.impact.tree_impact import FULL, SearchEnd
 from collision_monitor.monitor.shared_work import share
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
@@ -50,7 +49,7 @@ class FirstImpacts(Stage):
 
     def predict(self, step: StepContext, pairs: Pairs) -> Events:
         """First impacts (IMPACT) of pairs (P, 2) of body slots, in their order. Pairs without one are left out."""
-        find = _coarse_impacts if step.coarse.is_allowed else partial(_impacts, predict_pairs)
+        find = partial(_impacts, WHOLE, step.coarse)
         if self.pool is None or len(pairs) < FEWEST_PAIRS_FOR_THREADS:
             events, queries = find(step, pairs, self.scratch)
             step.work.impact_queries += queries
@@ -62,14 +61,14 @@ class FirstImpacts(Stage):
 
     def bound(self, step: StepContext, pairs: Pairs) -> Events:
         """As `predict`, but with only a bound by the bounding spheres for pairs that are not cheap (`is_cheap`)."""
-        return self._find(bound_pairs, step, pairs)
+        return self._find(BOUNDS, step, pairs)
 
     def refine(self, step: StepContext, bounds: Events) -> Events:
         """First impacts from now on of pairs whose events (IMPACT) are only bounds. Pairs without one are left out."""
-        return self._find(refine, step, bounds)
+        return self._find(ANEW, step, np.stack([bounds["i"], bounds["j"]], axis=1))
 
-    def _find(self, kernel: Callable[..., tuple[int, int]], step: StepContext, pairs: Pairs) -> Events:
-        events, queries = _impacts(kernel, step, pairs, self.scratch)
+    def _find(self, how: int, step: StepContext, pairs: Pairs) -> Events:
+        events, queries = _impacts(how, FULL, step, pairs, self.scratch)
         step.work.impact_queries += queries
         return events
 
@@ -80,17 +79,8 @@ class FirstImpacts(Stage):
         """See Stage: there is nothing to restore."""
 
 
-def _coarse_impacts(step: StepContext, pairs: Pairs, scratch: Scratch) -> tuple[Events, int]:
-    """As `_impacts` of `predict_pairs`, but with bounds on those of meshes."""
+def _impacts(how: int, ending: SearchEnd, step: StepContext, pairs: Pairs, scratch: Scratch) -> tuple[Events, int]:
+    """Impacts (IMPACT) of the pairs, in their order, and the number of distance queries; see `predict_pairs`."""
     events, query = np.empty(len(pairs) + 1, IMPACT), step.settings.impact
-    n, queries = predict_coarsely(step.roster.multibody, pairs, step.now, query, step.coarse, events, scratch)
-    return events[:n], queries
-
-
-def _impacts(
-    kernel: Callable[..., tuple[int, int]], step: StepContext, pairs: Pairs, scratch: Scratch
-) -> tuple[Events, int]:
-    """Impacts (IMPACT) that the kernel finds for the pairs, in their order, and the number of distance queries."""
-    events = np.empty(len(pairs) + 1, IMPACT)
-    n, queries = kernel(step.roster.multibody, pairs, step.now, step.settings.impact, events, scratch)
+    n, queries = predict_pairs(step.roster.multibody, pairs, step.now, query, ending, how, events, scratch)
     return events[:n], queries

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import kernel
-from collision_monitor.impact.acceleration_bounds import Intervals, first_possible_impacts, widen_intervals
+from collision_monitor.impact.acceleration_bounds import Intervals, widen_intervals
 from collision_monitor.impact.impact_record import holds, ids_of_keys, pair_keys, write_pair
 from collision_monitor.impact.pair_impacts import cover_of
 from collision_monitor.monitor.budget import SAMPLE, PairBudget
@@ -262,10 +262,12 @@ class UncertainPredictions(Stage):
         """
         if not self.spread.acceleration.any() or not len(entries):
             return possible
-        slots, first = np.stack([entries["i"], entries["j"]], axis=1), np.empty(len(entries))
-        query, horizon, work = step.settings.impact, step.profile.horizon, self._workspaces[0].exact
-        first_possible_impacts(step.roster.multibody, self.spread, slots, step.now, horizon, query, work, first)
-        meet = first < inf
+        slots, horizon, n = np.stack([entries["i"], entries["j"]], axis=1), step.profile.horizon, len(entries)
+        first = np.full(n, horizon)
+        intervals = Intervals(slots, first, np.full(n, inf), np.zeros(n, PREDICTION["status"]))
+        query, work = step.settings.impact, self._workspaces[0].exact
+        widen_intervals(step.roster.multibody, self.spread, intervals, step.now, horizon, query, work)
+        meet = first < horizon
         keys, first, slots = entries["key"][meet], first[meet], slots[meet]
         at = np.searchsorted(keys, known := pair_keys(possible["id_a"], possible["id_b"]))  # both ascend by key
         is_known = np.zeros(len(keys), np.bool_)

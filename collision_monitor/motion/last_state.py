@@ -51,15 +51,6 @@ def velocity_now(bodies: Any, i: int, age: float) -> Vector:
 
 
 @inlined
-def angular_now(bodies: Any, i: int, age: float) -> Vector:
-    """Angular velocity of body i `age` seconds after its last state (rad/s)."""
-    w, rate = bodies.angular, 1.0
-    if bodies.course[i] != STRAIGHT:
-        rate = place_now(bodies, i, age).rate
-    return rate * w[i, 0], rate * w[i, 1], rate * w[i, 2]
-
-
-@inlined
 def bending_now(bodies: Any, i: int, age: float, ahead: float) -> float:
     """Bound on the acceleration (m/s^2) of body i's origin in `ahead` s, from `age` s after its last state on."""
     v = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
@@ -76,34 +67,33 @@ def _coordinate(bodies: Any, i: int, age_i: float, j: int, age_j: float, c: int)
 
 
 @inlined
-def relative_position_now(bodies: Any, i: int, age_i: float, j: int, age_j: float) -> Vector:
-    """Position of body j's origin relative to body i's (m), each extrapolated by the age (s) of its last state."""
+def relative_state_now(
+    bodies: Any, i: int, age_i: float, j: int, age_j: float
+) -> tuple[Vector, Vector, Vector, Vector]:  # fmt: skip
+    """Position (m) and velocity (m/s) of body j's origin relative to body i's, and both angular velocities (rad/s).
+
+    Each body is extrapolated by the age (s) of its last state.
+    """
+    p, v, a, w = bodies.position, bodies.linear, bodies.acceleration, bodies.angular
+    w_i, w_j = (w[i, 0], w[i, 1], w[i, 2]), (w[j, 0], w[j, 1], w[j, 2])
     if bodies.course[i] != STRAIGHT or bodies.course[j] != STRAIGHT:
-        one, other = place_now(bodies, i, age_i).moved, place_now(bodies, j, age_j).moved
-        p = bodies.position
+        one, other = place_now(bodies, i, age_i), place_now(bodies, j, age_j)
+        moved = minus(other.moved, one.moved)
         return (
-            p[j, 0] - p[i, 0] + (other[0] - one[0]),
-            p[j, 1] - p[i, 1] + (other[1] - one[1]),
-            p[j, 2] - p[i, 2] + (other[2] - one[2]),
-        )
-    return (
+            (p[j, 0] - p[i, 0] + moved[0], p[j, 1] - p[i, 1] + moved[1], p[j, 2] - p[i, 2] + moved[2]),
+            minus(other.velocity, one.velocity), scaled(w_i, one.rate), scaled(w_j, other.rate),
+        )  # fmt: skip
+    position = (
         _coordinate(bodies, i, age_i, j, age_j, 0),
         _coordinate(bodies, i, age_i, j, age_j, 1),
         _coordinate(bodies, i, age_i, j, age_j, 2),
     )
-
-
-@inlined
-def relative_velocity_now(bodies: Any, i: int, age_i: float, j: int, age_j: float) -> Vector:
-    """Velocity of body j's origin relative to body i's (m/s)."""
-    if bodies.course[i] != STRAIGHT or bodies.course[j] != STRAIGHT:
-        return minus(place_now(bodies, j, age_j).velocity, place_now(bodies, i, age_i).velocity)
-    v, a = bodies.linear, bodies.acceleration
-    return (
+    velocity = (
         v[j, 0] - v[i, 0] + (a[j, 0] * age_j - a[i, 0] * age_i),
         v[j, 1] - v[i, 1] + (a[j, 1] * age_j - a[i, 1] * age_i),
         v[j, 2] - v[i, 2] + (a[j, 2] * age_j - a[i, 2] * age_i),
     )
+    return position, velocity, w_i, w_j
 
 
 @inlined
@@ -149,15 +139,18 @@ def set_reference(bodies: Any, i: int, age: float, time: float, q: Any, k: int, 
     q[k] (4,), written: its orientation then.
     """
     m.course, m.rest, m.time = bodies.course[i], inf, time
-    m.x, m.y, m.z = position_now(bodies, i, age)
     quaternion_now(bodies, i, age, q[k])
     quaternion_to_matrix(q, k, m.rotation)
     if m.course == STRAIGHT:
+        m.x, m.y, m.z = position_now(bodies, i, age)
         m.vx, m.vy, m.vz = velocity_now(bodies, i, age)
         m.wx, m.wy, m.wz = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
         m.ax, m.ay, m.az = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]
         return
     there, m.rest = twist_now(bodies, i, age), time + (bodies.rest[i] - age)
+    m.x = bodies.position[i, 0] + there.moved[0]
+    m.y = bodies.position[i, 1] + there.moved[1]
+    m.z = bodies.position[i, 2] + there.moved[2]
     m.vx, m.vy, m.vz = there.velocity
     m.wx, m.wy, m.wz = there.angular
     m.ax, m.ay, m.az = scaled(there.velocity, there.change)

@@ -50,7 +50,7 @@ def _could_meet(multibody: Any, spread: Any, i: int, j: int, now: float, nearnes
     reach = bodies.motion[i].radius + bodies.motion[j].radius + margin
     if not reach < inf:
         return True
-    p, v, age_i, age_j = relative_now(bodies, i, j, now)
+    p, v, age_i, age_j, _, _ = relative_now(bodies, i, j, now)
     r_i, r_j = swing_radius(bodies, spread, i), swing_radius(bodies, spread, j)
     start_i, growth_i = surface_spread(bodies, spread, i, r_i, age_i, horizon, stale_acceleration)
     start_j, growth_j = surface_spread(bodies, spread, j, r_j, age_j, horizon, stale_acceleration)

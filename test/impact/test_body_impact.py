@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 
 from collision_monitor.impact.body_impact import ImpactQuery, make_scratch
 from collision_monitor.impact.impact_record import HIT, IMPACT, UNRESOLVED
-from collision_monitor.impact.pair_impacts import predict_pairs
+from collision_monitor.impact.pair_impacts import WHOLE, predict_pairs
+from collision_monitor.impact.tree_impact import FULL
 from collision_monitor.motion.bodies import Multibody, make_bodies, make_parts
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.records import ShapeType
@@ -73,6 +74,8 @@ class PairScene:
             self.pairs,
             0.0,
             ImpactQuery(0.0, tolerance, budget),
+            FULL,
+            WHOLE,
             events,
             make_scratch(),
         )

@@ -116,7 +116,7 @@ def carry_contact(
     result[DISTANCE] += 0.5 * (moved + along)
     for c in range(3):
         result[POINT_B + c] += relative.p[c]  # `closing_now` takes both points about body i
-    result[CLOSING] = closing_now(bodies, i, j, relative, result)
+    result[CLOSING] = closing_now(relative, result)
     result[BOUND] += half + widening(relative, query.stale_acceleration)
     at_i, at_j = position_now(bodies, i, relative.age_i), position_now(bodies, j, relative.age_j)
     for c in range(3):

@@ -140,7 +140,7 @@ def _write(
     for c in range(3):
         result[POINT_A + c] += oa[c]
         result[POINT_B + c] += oa[c]
-    result[CLOSING] = closing_now(bodies, i, j, there, result)
+    result[CLOSING] = closing_now(there, result)
     result[DISTANCE] = most - half
     result[BOUND] += max(half, parting + most - half) + widening(there, query.stale_acceleration)
     result[STATUS] = TOUCHING

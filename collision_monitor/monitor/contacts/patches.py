@@ -137,7 +137,7 @@ def _join(bodies: Any, active: Active, now: float, patches: _Patches, most: int,
                 out[POINT_A + d] = corners[c, d]
                 out[POINT_B + d] = corners[c, d] + out[DISTANCE] * out[NORMAL + d]
                 points.position[k, c, d] = corners[c, d] + at[d]
-            points.closing[k, c] = closing_now(bodies, i, j, there, out)
+            points.closing[k, c] = closing_now(there, out)
 
 
 def with_patches(

@@ -82,7 +82,7 @@ def plain_contact(
         touching_features(table.size[a], table.size[b], pose, gap, n, result, scratch.work)
     if is_swapped:
         mirror(result, relative.p)
-    result[CLOSING] = closing_now(bodies, i, j, relative, result)
+    result[CLOSING] = closing_now(relative, result)
     result[BOUND] += widening(relative, query.stale_acceleration)
     move_to_world(bodies, i, relative, result)
     return True

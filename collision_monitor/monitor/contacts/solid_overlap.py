@@ -92,7 +92,7 @@ def overlap_of_solid(
     for c in range(3):
         result[POINT_A + c] += origin[c]
         result[POINT_B + c] += origin[c]
-    result[CLOSING] = closing_now(bodies, i, j, there, result)
+    result[CLOSING] = closing_now(there, result)
     result[DISTANCE] = most - half
     result[BOUND] += widening(there, query.stale_acceleration)
     result[STATUS] = TOUCHING

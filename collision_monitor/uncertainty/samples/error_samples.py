@@ -7,7 +7,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.geometry.vector import Vector, cross, dot
 from collision_monitor.impact.body_impact import Scratch, make_scratch
 from collision_monitor.motion.course import ARC, place_on, turned_for
@@ -127,21 +127,31 @@ def add_covariance(
                 joint[row + r, column + c] += x * frame[c, 0] + y * frame[c, 1] + z * frame[c, 2]
 
 
-@device
+@inlined
 def add_arc_errors(m: Any, spread: Any, i: int, age: float, t: float, yaw_only: bool, work: Workspace) -> None:
-    """Add to work.joint how errors of orientation and angular velocity move body i, which goes along an arc m (MOTION).
+    """Add to work.joint how errors of orientation and angular velocity move body i, if it goes along an arc m (MOTION).
+
+    age: s since its last state; t: s from now.
+    """
+    if m.course == ARC and t > 0.0:
+        pose, rate = spread.stddev[i, 1], spread.stddev[i, 3]
+        variance = pose * pose + rate * rate * (age * age + age * t + 0.25 * t * t)
+        _add_turned_path(m, variance, t, yaw_only, work.frame, work.joint, work.block)
+
+
+@outlined
+def _add_turned_path(m: Any, variance: float, t: float, yaw_only: bool, frame: Any, joint: Any, C: Any) -> None:
+    """Add to a joint covariance (6, 6) how a body on an arc m (MOTION) is moved by errors that turn its path.
+
+    variance: of the angle by which they turn the chord of the path until t (rad^2). frame (3, 3): axes of the
+    covariance; C (3, 3): scratch.
 
     An error of its orientation turns the chord of its path until t (s from now); one of its angular velocity, which
     grows, turns half of that. Both count as errors of the velocity that are right at t, independent of how they turn
-    the body. age: s since its last state.
+    the body.
     """
-    if m.course != ARC or not t > 0.0:
-        return
     moved = place_at(m, t).moved
     chord = (moved[0] / t, moved[1] / t, moved[2] / t)
-    pose, rate = spread.stddev[i, 1], spread.stddev[i, 3]
-    variance = pose * pose + rate * rate * (age * age + age * t + 0.25 * t * t)
-    C, frame, joint = work.block, work.frame, work.joint
     for r in range(3):
         for c in range(3):
             C[r, c] = -chord[r] * chord[c] * variance
@@ -186,7 +196,7 @@ def take_root(joint: Any) -> None:
             joint[r, c] = 0.0
 
 
-@device
+@outlined
 def turn(m: Any, R: Any, w: Vector, velocity: Vector, off: Any, error: Vector, left: Vector) -> None:
     """Set rotation and angular velocity of m (MOTION) to R and w (3,), off by unit errors, see `orientation_spread`.
 
