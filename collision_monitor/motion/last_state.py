@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import inf
 from typing import Any
 
-from collision_monitor._jit import device, inlined
+from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.geometry.vector import Vector, minus, scaled
 from collision_monitor.motion.course import STRAIGHT, Place, most_acceleration, place_on, turned_for
 from collision_monitor.motion.motion import Twist, quaternion_to_matrix, turn_quaternion, twist_on
@@ -38,16 +38,6 @@ def position_now(bodies: Any, i: int, age: float) -> Vector:
         p[i, 1] + (v[i, 1] * age + 0.5 * a[i, 1] * age * age),
         p[i, 2] + (v[i, 2] * age + 0.5 * a[i, 2] * age * age),
     )
-
-
-@inlined
-def velocity_now(bodies: Any, i: int, age: float) -> Vector:
-    """Velocity of body i's origin `age` seconds after its last state (m/s)."""
-    if bodies.course[i] != STRAIGHT:
-        velocity: Vector = place_now(bodies, i, age).velocity
-        return velocity
-    v, a = bodies.linear, bodies.acceleration
-    return v[i, 0] + a[i, 0] * age, v[i, 1] + a[i, 1] * age, v[i, 2] + a[i, 2] * age
 
 
 @inlined
@@ -138,19 +128,31 @@ def set_reference(bodies: Any, i: int, age: float, time: float, q: Any, k: int, 
 
     q[k] (4,), written: its orientation then.
     """
-    m.course, m.rest, m.time = bodies.course[i], inf, time
+    p, v, w, a = bodies.position, bodies.linear, bodies.angular, bodies.acceleration
     quaternion_now(bodies, i, age, q[k])
     quaternion_to_matrix(q, k, m.rotation)
-    if m.course == STRAIGHT:
-        m.x, m.y, m.z = position_now(bodies, i, age)
-        m.vx, m.vy, m.vz = velocity_now(bodies, i, age)
-        m.wx, m.wy, m.wz = bodies.angular[i, 0], bodies.angular[i, 1], bodies.angular[i, 2]
-        m.ax, m.ay, m.az = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]
+    _set_course(
+        bodies.course[i], (p[i, 0], p[i, 1], p[i, 2]), (v[i, 0], v[i, 1], v[i, 2]), (w[i, 0], w[i, 1], w[i, 2]),
+        (a[i, 0], a[i, 1], a[i, 2]), bodies.rest[i], age, time, m,
+    )  # fmt: skip
+
+
+@outlined
+def _set_course(
+    kind: int, p: Vector, v: Vector, w: Vector, a: Vector, rest: float, age: float, time: float, m: Any
+) -> None:  # fmt: skip
+    """Make the course from a state, `age` seconds after it, the motion m (MOTION) from `time` on; see `place_on`."""
+    m.course, m.rest, m.time = kind, inf, time
+    if kind == STRAIGHT:
+        m.x = p[0] + (v[0] * age + 0.5 * a[0] * age * age)
+        m.y = p[1] + (v[1] * age + 0.5 * a[1] * age * age)
+        m.z = p[2] + (v[2] * age + 0.5 * a[2] * age * age)
+        m.vx, m.vy, m.vz = v[0] + a[0] * age, v[1] + a[1] * age, v[2] + a[2] * age
+        m.wx, m.wy, m.wz = w
+        m.ax, m.ay, m.az = a
         return
-    there, m.rest = twist_now(bodies, i, age), time + (bodies.rest[i] - age)
-    m.x = bodies.position[i, 0] + there.moved[0]
-    m.y = bodies.position[i, 1] + there.moved[1]
-    m.z = bodies.position[i, 2] + there.moved[2]
+    there, m.rest = twist_on(kind, v, w, a, age, rest), time + (rest - age)
+    m.x, m.y, m.z = p[0] + there.moved[0], p[1] + there.moved[1], p[2] + there.moved[2]
     m.vx, m.vy, m.vz = there.velocity
     m.wx, m.wy, m.wz = there.angular
     m.ax, m.ay, m.az = scaled(there.velocity, there.change)

@@ -85,7 +85,7 @@ def turned_at(m: Any, t: float) -> float:
     return turned_for(m.course, (m.vx, m.vy, m.vz), (m.ax, m.ay, m.az), t - m.time, m.rest - m.time)
 
 
-@inlined
+@outlined
 def rotation_at(m: Any, t: float, out: Any) -> None:
     """Write the rotation of the motion m (MOTION) at time t, exp((t - m.time) [w]x) R, into out (3, 3) (Rodrigues).
 
