@@ -20,9 +20,9 @@ class MonitoredBodies:
     (N, 3): extrapolated from the last states. acceleration (N, 3): constant from now on, 0 for a body that brakes or
     goes along an arc; bending (N,): a bound on that of such a body until the horizon, else 0. radius (N,): of the
     sphere about the origin that holds the body (m); may be infinite. turning (N,): bound on the speed of its points
-    about the origin (m/s); speed (N,): on any. doubt (N,): how far it may have left its path since its last state (m).
-    stale (N,): the last state is too old, or there is none. scratch: memory for the kernels, of one thread; None: its
-    own.
+    about the origin until the horizon (m/s); speed (N,): on any now. doubt (N,): how far it may have left its path
+    since its last state (m). stale (N,): the last state is too old, or there is none. scratch: memory for the kernels,
+    of one thread; None: its own.
     """
 
     def __init__(self, roster: Roster, profile: Profile, now: float, scratch: Scratch | None = None) -> None:
@@ -31,7 +31,7 @@ class MonitoredBodies:
         self.scratch = make_scratch() if scratch is None else scratch
         there = extrapolated(b, np.arange(top), now, profile.horizon)
         age = there.age
-        turning = np.sqrt((there.angular**2).sum(axis=1))
+        turning = there.turning
         self.radius: Array = b.motion["radius"][:top]
         self.position, self.velocity, self.angular = there.position, there.velocity, there.angular
         self.acceleration, self.bending = there.acceleration, there.bending

@@ -11,11 +11,12 @@ from math import inf
 from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined, kernel, outlined
-from collision_monitor.geometry.vector import Vector
+from collision_monitor.geometry.vector import Vector, magnitude
 from collision_monitor.impact.body_impact import ShapePair, Tube, Window, contact_at, shape_impact
 from collision_monitor.impact.impact_record import CLEAR, UNRESOLVED
 from collision_monitor.motion.bodies import next_pair
-from collision_monitor.motion.last_state import carry_on
+from collision_monitor.motion.course import ARC
+from collision_monitor.motion.last_state import age_of, bending_now, carry_on, twist_now
 from collision_monitor.narrow_phase.contact_row import BOUND
 
 SEGMENTS: Final = 8
@@ -79,10 +80,18 @@ def _first_certain(multibody: Any, i: int, j: int, window: Window, off: Vector, 
 
 
 @device
-def _bound(bodies: Any, spread: Any, i: int) -> float:
-    """Largest acceleration of any point of body i relative to its stated motion (m/s^2)."""
+def _bound(bodies: Any, spread: Any, i: int, horizon: float) -> float:
+    """Largest acceleration of any point of body i relative to its stated motion (m/s^2), until the horizon (s).
+
+    A body on an arc may leave it by going straight on, and one that turns harder leaves its path by v alpha t^3 / 6.
+    """
     turning = spread.acceleration[i, 1]
-    return spread.acceleration[i, 0] + (turning * bodies.spin_radius[i] if turning > 0.0 else 0.0)
+    bound = spread.acceleration[i, 0] + (turning * bodies.spin_radius[i] if turning > 0.0 else 0.0)
+    if bodies.course[i] == ARC and bound > 0.0:
+        age = age_of(bodies, i, horizon)
+        bound += bending_now(bodies, i, 0.0, age)
+        bound += turning * magnitude(twist_now(bodies, i, 0.0).velocity) * age / 3.0
+    return bound
 
 
 @inlined
@@ -107,7 +116,7 @@ def widen_intervals(
     pairs, lower, upper, status = intervals
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
-        a_i, a_j = _bound(bodies, spread, i), _bound(bodies, spread, j)
+        a_i, a_j = _bound(bodies, spread, i, now + horizon), _bound(bodies, spread, j, now + horizon)
         if not a_i + a_j > 0.0:
             continue
         age_i = carry_on(bodies, i, now, work.quaternion, work.motion[0])

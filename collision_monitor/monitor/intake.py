@@ -344,7 +344,7 @@ def _store(bodies: Any, i: int, numbers: Any, k: int, flags: int, time: float) -
         _estimate_twist(bodies, i, numbers[k, :3], (x, y, z, w), time - bodies.time[i])
         if (flags & _BODY_TWIST) != 0:
             _bend_twist(bodies, i, time - bodies.time[i])
-        for c in range(3 if accelerates else 0):
+        for c in range(3 if accelerates and (flags & _BODY_TWIST) == 0 else 0):
             # the estimate is the mean velocity since the last state, which the body had half-way
             bodies.linear[i, c] += 0.5 * numbers[k, 13 + c] * (time - bodies.time[i])
         for c in (_POSITION_STDDEV, _ORIENTATION_STDDEV):
@@ -361,7 +361,8 @@ def _store(bodies: Any, i: int, numbers: Any, k: int, flags: int, time: float) -
     bodies.quaternion[i, 2], bodies.quaternion[i, 3] = z, w
     bodies.course[i] = STRAIGHT
     if (flags & (_BODY_TWIST | _STOPS)) != 0:
-        _set_course(bodies, i, flags)
+        is_estimated = (flags & _TWIST_UNKNOWN) != 0 and bodies.seen[i] and (flags & _DISCONTINUITY) == 0
+        _set_course(bodies, i, flags, time - bodies.time[i] if is_estimated else 0.0)
     bodies.time[i] = time
     bodies.seen[i] = True
 
@@ -377,8 +378,11 @@ def _turned(q: Any, i: int, v: Any) -> Vector:
 
 
 @device
-def _set_course(bodies: Any, i: int, flags: int) -> None:
-    """Set the course of body i, whose state has a twist along its own axes (BODY_TWIST) or ends at rest (STOPS)."""
+def _set_course(bodies: Any, i: int, flags: int, elapsed: float) -> None:
+    """Set the course of body i, whose state has a twist along its own axes (BODY_TWIST) or ends at rest (STOPS).
+
+    elapsed: s over which its velocity is estimated as a mean, which the body had half-way; else 0.
+    """
     turns, q = (flags & _BODY_TWIST) != 0, bodies.quaternion
     v, w = bodies.linear, bodies.angular
     if turns and (flags & _TWIST_UNKNOWN) == 0:
@@ -387,6 +391,8 @@ def _set_course(bodies: Any, i: int, flags: int) -> None:
     a = bodies.acceleration
     if turns:
         a[i, 0], a[i, 1], a[i, 2] = _turned(q, i, a)
+        for c in range(3):
+            v[i, c] += 0.5 * a[i, c] * elapsed
     course = course_of(
         (v[i, 0], v[i, 1], v[i, 2]), (w[i, 0], w[i, 1], w[i, 2]), (a[i, 0], a[i, 1], a[i, 2]), turns,
         (flags & _STOPS) != 0,

@@ -272,7 +272,8 @@ def _course_deviation(
         slower = magnitude(minus(scaled(own.velocity, own.change), scaled(other.velocity, other.change)))
         bend = magnitude(minus(scaled(own.angular, own.change), scaled(other.angular, other.change)))
     fastest = max(magnitude(own.velocity), magnitude(other.velocity))
-    fastest *= 1.0 + 2.0 * horizon * max(own.change, other.change, 0.0)
+    if m.rest == inf:  # it may speed up, or go backwards
+        fastest *= max(1.0, abs(1.0 + 2.0 * horizon * own.change), abs(1.0 + 2.0 * horizon * other.change))
     drift = magnitude(minus(own.velocity, other.velocity))
     drift += horizon * (slower + fastest * (off + 2.0 / 3.0 * horizon * bend))
     apart += 0.5 * stale_acceleration * age * age

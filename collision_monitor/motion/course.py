@@ -29,6 +29,12 @@ FASTER: Final = 1.0
 """1/s: largest increase of the speed on an arc, in parts of the speed. Larger: a robot that turns in place and starts
 to drive would be predicted to turn as much faster as it drives faster. It keeps its rate of turn instead."""
 
+ALIGNED: Final = 1e-9
+"""Sine of the angle between velocity and axis of rotation up to which a body does not bend: round-off turns so far."""
+
+SLOWEST: Final = 1e-9
+"""rad/s. Slower, a body bends by nothing that counts: 1e-9 of its way in a second."""
+
 SERIES: Final = 0.5
 """rad. Up to it, the shift of an arc is computed from a series, because its closed form cancels."""
 
@@ -69,7 +75,10 @@ def course_of(v: Vector, w: Vector, a: Vector, turns: bool, stops: bool) -> Cour
     part = along / vv if vv > 0.0 else 0.0  # of the speed, per second
     aligned = (part * v[0], part * v[1], part * v[2])
     across, aside = cross(w, v), cross(a, v)
-    is_arc = turns and dot(across, across) > 0.0
+    bends = dot(across, across)
+    is_arc = turns and bends > ALIGNED * ALIGNED * vv * dot(w, w) and dot(w, w) > SLOWEST * SLOWEST
+    # an acceleration across the velocity, other than the arc's own, is that of another path
+    is_arc = is_arc and dot(aside, aside) <= 4.0 * bends * vv
     if is_arc and not part <= FASTER:  # along the parabola that fits the arc best
         is_arc, a = False, (a[0] + across[0], a[1] + across[1], a[2] + across[2])
     brakes = stops and part < 0.0 and (is_arc or sqrt(dot(aside, aside)) <= -ASIDE * along)

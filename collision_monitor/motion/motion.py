@@ -345,6 +345,10 @@ def _swept_by_pieces(m: Any, begin: float, sweep: float, half: float) -> Region:
     )
 
 
+LATER: Final = 1e-12
+"""Part of the time since a state by which a body that reverses is looked at later, if it stands at that moment."""
+
+
 class Twist(NamedTuple):
     """How a body moves at a time. World axes."""
 
@@ -358,6 +362,8 @@ class Twist(NamedTuple):
 def twist_on(kind: int, v: Vector, w: Vector, a: Vector, t: float, rest: float) -> Twist:
     """How a body moves t (s) after its state, see `place_on`."""
     there = place_on(kind, v, w, a, t, rest)
+    if there.rate == 0.0 and t < rest:  # it reverses at this moment: a rounding later it has a direction again
+        there = place_on(kind, v, w, a, t * (1.0 + LATER), rest)
     change = speed_change(v, a) / there.rate if kind != STRAIGHT and there.rate != 0.0 else 0.0
     return Twist(there.moved, there.velocity, scaled(w, there.rate), change)
 

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor._jit import allocating_kernel
 from collision_monitor.geometry.vector import rotate, rotate_back, scaled
-from collision_monitor.motion.course import STRAIGHT, course_of, place_on, speed_change, turned_for
-from collision_monitor.motion.motion import quaternion_to_matrix, turn_quaternion
+from collision_monitor.motion.course import STRAIGHT, course_of, turned_for
+from collision_monitor.motion.motion import quaternion_to_matrix, turn_quaternion, twist_on
 from collision_monitor.records import StateFlag
 from collision_monitor.shapes.pose import rotation_matrix
 
@@ -30,6 +30,17 @@ def moved_states(states: States, seconds: ArrayLike) -> States:
     after = np.ascontiguousarray(np.broadcast_to(np.asarray(seconds, np.float64), len(moved)))
     _move(numbers, np.ascontiguousarray(moved["flags"]), after)
     return moved
+
+
+def in_world(states: States) -> States:
+    """Return copies of states (N,) with all twists along the world's axes, and no BODY_TWIST."""
+    turned = np.ascontiguousarray(states).copy()
+    own = (turned["flags"] & np.uint32(_BODY)) != 0
+    R = rotation_matrix(turned["quaternion"][own])
+    for name in _VECTORS:
+        turned[name][own] = (R @ turned[name][own][..., None])[..., 0]
+    turned["flags"] &= ~np.uint32(_BODY)
+    return turned
 
 
 def along_body(states: States, which: NDArray[np.bool_]) -> None:
@@ -55,11 +66,11 @@ def _move(numbers: Any, flags: Any, seconds: Any) -> None:
             v, w, a = rotate(R, v), rotate(R, w), rotate(R, a)
         course = course_of(v, w, a, turns, (flags[k] & _STOPS) != 0)
         kind, a, rest = course.kind, course.acceleration, course.rest
-        there = place_on(kind, v, w, a, t, rest)
+        there = twist_on(kind, v, w, a, t, rest)
         turn_quaternion(numbers[:, 3:7], k, w[0], w[1], w[2], turned_for(kind, v, a, t, rest), q[0])
         if kind != STRAIGHT:
-            a = scaled(there.velocity, speed_change(v, a) / there.rate if there.rate != 0.0 else 0.0)
-        v, w = there.velocity, scaled(w, there.rate)
+            a = scaled(there.velocity, there.change)
+        v, w = there.velocity, there.angular
         for c in range(3):
             row[c] += there.moved[c]
         for c in range(4):
@@ -67,7 +78,8 @@ def _move(numbers: Any, flags: Any, seconds: Any) -> None:
         if turns:
             quaternion_to_matrix(q, 0, R)
             v, w, a = rotate_back(R, v), rotate_back(R, w), rotate_back(R, a)
+        keeps = turns and kind == STRAIGHT  # an acceleration along the body's axes stays as it is there
         for c in range(3):
             row[7 + c], row[10 + c] = v[c], w[c]
-            if (flags[k] & _VALID) != 0:
+            if (flags[k] & _VALID) != 0 and not keeps:
                 row[13 + c] = a[c]

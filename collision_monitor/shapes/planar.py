@@ -6,10 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import PoseError
-from collision_monitor.shapes.pose import Pose
+from collision_monitor.records import StateFlag
+from collision_monitor.shapes.pose import Pose, rotation_matrix
 from collision_monitor.shapes.registry import Shape, kind_of
 
-PLANAR_VECTORS = {"position": slice(2, 3), "linear": slice(2, 3), "angular": slice(0, 2)}
+PLANAR_VECTORS = {
+    "position": slice(2, 3),
+    "linear": slice(2, 3),
+    "angular": slice(0, 2),
+    "acceleration": slice(2, 3),
+}
 """Fields of records.STATE, and their components that the plane ignores."""
 
 
@@ -28,9 +34,17 @@ def flat_quaternions(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
 def flat_states(states: NDArray[np.void]) -> NDArray[np.void]:
     """Copy of records.STATE (n,) without height, tilt and the motion out of the plane."""
     flat = states.copy()
-    for field, dropped in PLANAR_VECTORS.items():
-        flat[field][:, dropped] = 0.0
+    own = (states["flags"] & StateFlag.BODY_TWIST) != 0  # these twists are along axes that are tilted before
     flat["quaternion"] = flat_quaternions(states["quaternion"])
+    turned = own & flat["quaternion"].any(axis=1)
+    before, after = (rotation_matrix(each["quaternion"][turned]) for each in (states, flat))
+    for field, dropped in PLANAR_VECTORS.items():
+        is_vector = field != "position"
+        if is_vector:
+            flat[field][turned] = (before @ flat[field][turned][..., None])[..., 0]
+        flat[field][:, dropped] = 0.0
+        if is_vector:
+            flat[field][turned] = (np.swapaxes(after, -1, -2) @ flat[field][turned][..., None])[..., 0]
     return flat
 
 

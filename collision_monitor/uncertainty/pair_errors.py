@@ -7,7 +7,8 @@ from typing import Any, Final, NamedTuple
 
 from collision_monitor._jit import device, inlined
 from collision_monitor.geometry.vector import Vector, dot, magnitude
-from collision_monitor.motion.motion import are_straight, relative_position, relative_velocity
+from collision_monitor.motion.course import STRAIGHT
+from collision_monitor.motion.motion import are_straight, most_turning, relative_position, relative_velocity, twist_at
 from collision_monitor.uncertainty.samples.error_samples import (
     LEFT_OVER,
     ORIENTATION,
@@ -81,9 +82,12 @@ def spin_rate(m: Any) -> float:
 
 
 @inlined
-def surface_bend(m: Any, radius: float) -> float:
-    """Bound on the acceleration of a body's surface from its rotation (m/s^2)."""
+def surface_bend(m: Any, radius: float, horizon: float) -> float:
+    """Bound on the acceleration of a body's surface from its rotation until the horizon (m/s^2)."""
     rate = spin_rate(m)
+    if m.course != STRAIGHT and rate > 0.0:
+        most = most_turning(m, 0.0, horizon)
+        return radius * (most * most + rate * abs(twist_at(m, 0.0).change))
     return radius * rate * rate if rate > 0.0 else 0.0
 
 
@@ -212,12 +216,13 @@ def set_gap_covariance(
     """
     bodies = multibody.bodies
     work.joint[:] = 0.0
+    times = t, sampling.horizon
     if not bodies.static[i]:
         add_covariance(spread, i, ages[0], t, right, sampling.stale_acceleration, sampling.planar, work)
-        add_arc_errors(work.motion[0], spread, i, ages[0], t, turns_by_yaw(spread, i, sampling.planar), work)
+        add_arc_errors(work.motion[0], spread, i, ages[0], times, turns_by_yaw(spread, i, sampling.planar), work)
     if not bodies.static[j]:
         add_covariance(spread, j, ages[1], t, right, sampling.stale_acceleration, sampling.planar, work)
-        add_arc_errors(work.motion[1], spread, j, ages[1], t, turns_by_yaw(spread, j, sampling.planar), work)
+        add_arc_errors(work.motion[1], spread, j, ages[1], times, turns_by_yaw(spread, j, sampling.planar), work)
 
 
 @inlined

@@ -82,7 +82,8 @@ def plane_probabilities(
         now_i, growth_i = surface_spread(bodies, spread, i, r_i, ages[0], horizon, stale_acceleration)
         now_j, growth_j = surface_spread(bodies, spread, j, r_j, ages[1], horizon, stale_acceleration)
         tube = Tube(now_i + now_j, growth_i + growth_j)
-        bend = surface_bend(A, r_i) + surface_bend(B, r_j) + 2.0 * half_acceleration(A, B, 0.0, horizon)
+        bend = surface_bend(A, r_i, horizon) + surface_bend(B, r_j, horizon)
+        bend += 2.0 * half_acceleration(A, B, 0.0, horizon)
         t = closest = closest_time(A, B, horizon) if A.radius + B.radius < inf else 0.0
         swing_i, swing_j = swing_bound(spread, i, r_i, ages[0], horizon), swing_bound(spread, j, r_j, ages[1], horizon)
         turning = (swing_i[0] + swing_j[0], swing_i[1] + swing_j[1])

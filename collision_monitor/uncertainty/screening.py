@@ -13,12 +13,12 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor._jit import device, inlined
-from collision_monitor.geometry.vector import Vector
+from collision_monitor.geometry.vector import Vector, magnitude
 from collision_monitor.impact.body_impact import ImpactQuery, ShapePair, Tube, Window, shape_impact
 from collision_monitor.impact.impact_record import CLEAR, HIT
 from collision_monitor.impact.sphere_interval import sphere_interval
 from collision_monitor.motion.bodies import next_pair, place_shape
-from collision_monitor.motion.motion import half_acceleration, relative_position
+from collision_monitor.motion.motion import half_acceleration, most_turning, relative_position
 from collision_monitor.narrow_phase.gjk import Accuracy
 from collision_monitor.uncertainty.obstacle_planes import ABOUT_ALL, NO_TURNS, NOT_OFF, separation_at, set_nodes
 from collision_monitor.uncertainty.samples.normal_samples import FURTHEST
@@ -71,8 +71,7 @@ def meeting(
     oa, ob = place_shape(table, parts, a, A.rotation, R_a), place_shape(table, parts, b, B.rotation, R_b)
     p = (B.x - A.x + ob[0] - oa[0], B.y - A.y + ob[1] - oa[1], B.z - A.z + ob[2] - oa[2])
     bent = half_acceleration(A, B, 0.0, horizon) * horizon
-    bent += sqrt((A.wx * A.wx + A.wy * A.wy + A.wz * A.wz) * (oa[0] * oa[0] + oa[1] * oa[1] + oa[2] * oa[2]))
-    bent += sqrt((B.wx * B.wx + B.wy * B.wy + B.wz * B.wz) * (ob[0] * ob[0] + ob[1] * ob[1] + ob[2] * ob[2]))
+    bent += most_turning(A, 0.0, horizon) * magnitude(oa) + most_turning(B, 0.0, horizon) * magnitude(ob)
     return sphere_interval(p, (B.vx - A.vx, B.vy - A.vy, B.vz - A.vz), reach, tube.growth + bent, horizon, 1.0)
 
 

@@ -8,6 +8,7 @@ stale_acceleration: a stale object widens its spread here, in `unknown_accelerat
 
 from __future__ import annotations
 
+from math import inf
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -173,6 +174,9 @@ def surface_spread(
         growth += radius * (s_w + turning * (age + 0.5 * ahead))
         if bodies.course[i] == ARC:
             v = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
-            off = s_o + s_w * (age + ahead) + 0.5 * turning * (age + ahead) * (age + ahead)
-            now, growth = now + magnitude(v) * age * off, growth + magnitude(v) * off
+            a = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]
+            whole = age + ahead
+            off = s_o + s_w * whole + 0.5 * turning * whole * whole
+            fastest = magnitude(v) + (magnitude(a) * whole if bodies.rest[i] == inf else 0.0)
+            now, growth = now + fastest * age * off, growth + fastest * off
     return now, growth

@@ -1,7 +1,7 @@
 """Time and probability of impact of two bodies with uncertain states: earliest, most likely and latest time.
 
-The relative motion is a straight line whose start and velocity are normally distributed (spread.py). Evenly spread
-samples of it, each followed as exactly as the stated motion, give the distribution of the time of impact
+The relative motion is the stated one, off by a straight line whose start and velocity are normally distributed
+(spread.py). Evenly spread samples of it, each followed exactly, give the distribution of the time of impact
 (docs/uncertainty.md). The coordinates of the samples are ordered by importance. First comes the error of the position
 at the time of closest approach, which decides whether the bodies meet, and of it the part across the path. The
 remaining error of the velocity comes after it.
@@ -481,8 +481,8 @@ def impact_probabilities(
         # a search for the overlap of half a tolerance; the surface of a mesh has no gap below 0
         exact = has_mesh or (bodies.spin_radius[i] == 0.0 and bodies.spin_radius[j] == 0.0)
         bias = 0.0 if exact else -0.75 * coarse
-        p, v = (B.x, B.y, B.z), (B.vx, B.vy, B.vz)
         w_i, w_j, v_i = (A.wx, A.wy, A.wz), (B.wx, B.wy, B.wz), (A.vx, A.vy, A.vz)
+        motions = ((A.x, A.y, A.z), v_i), ((B.x, B.y, B.z), (B.vx, B.vy, B.vz), w_j)
         straight = _is_straight(parts, bodies, i, j, A, B) and not (turns_i or turns_j)
         work.axes[:, 3] = inf  # no axis is known yet
         share, is_open = weights.copy(), (0, size, size, size)
@@ -500,7 +500,7 @@ def impact_probabilities(
             if few and nth == 1:
                 is_open = open_ranks(times, order, FEW_SPARE)
             if foretells and nth == 2:
-                shift(work, np.zeros(DIMENSIONS), t, p, v, w_j)
+                shift(work, np.zeros(DIMENSIONS), t, motions)
                 turn(A, work.rotation[0], w_i, v_i, turn_i, NOT_OFF, NOT_OFF)
                 turn(B, work.rotation[1], w_j, (B.vx, B.vy, B.vz), turn_j, NOT_OFF, NOT_OFF)
                 _set_sides(multibody, i, j, t, (turn_i, turn_j), yaw_only, times, 2 * size, sampling, work, sides)
@@ -522,7 +522,7 @@ def impact_probabilities(
                 if mirrors:
                     _mirrored(z, sides.widening[0], work.sample)
                     z = work.sample
-                shift(work, z, t, p, v, w_j)
+                shift(work, z, t, motions)
                 if turns_i:
                     own, left = _unit(z, ORIENTATION, level_i), _unit(z, LEFT_OVER, level_i)
                     turn(A, work.rotation[0], w_i, v_i, turn_i, own, left)

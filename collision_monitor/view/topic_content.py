@@ -270,4 +270,5 @@ def _estimate_twists(states: States, before: States, elapsed: NDArray[np.float64
     states["linear"][unknown] = moved / elapsed
     axis = turn[:, :3] / np.where(sine > 0.0, sine, 1.0)
     states["angular"][unknown] = axis * angle / elapsed
-    states["flags"][unknown] &= ~np.uint32(StateFlag.BODY_TWIST)  # these are along the world's axes
+    bent = unknown & ((states["flags"] & StateFlag.BODY_TWIST) != 0)  # the estimates are along the world's axes
+    states["flags"][bent] &= ~np.uint32(StateFlag.BODY_TWIST | StateFlag.ACCELERATION_VALID)

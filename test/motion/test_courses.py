@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 import collision_monitor as cm
 from collision_monitor import Motion, Pose, contact, time_of_impact
 from collision_monitor.errors import PoseError
+from collision_monitor.motion.moved_states import moved_states
 from collision_monitor.records import STATE, StateFlag
 from collision_monitor.settings.profile import Profile
 
@@ -105,7 +106,7 @@ def test_an_arc_of_a_tiny_angle_is_a_line_and_neighbours_agree() -> None:
     still = Motion(Pose(), (1, 2, 3), (0, 0, 0), frame="body")
     assert still.is_straight
     before = still.at(2.0).position
-    for rate in 10.0 ** np.arange(-300, -6, 9.0):
+    for rate in 10.0 ** np.array([*np.arange(-300, -6, 9.0), -162.0, -161.0, -9.0]):
         at = Motion(Pose(), (1, 2, 3), (0, 0, rate), frame="body").at(2.0).position
         assert np.abs(at - before).max() <= 10.0 * rate + 1e-15
     series = [
@@ -293,3 +294,54 @@ def test_the_speed_of_a_turn_that_starts_does_not_run_away() -> None:
     starts = Motion(Pose(), (1e-3, 0, 0), (0, 0, 0.5), (0.5, 0, 0), frame="body")
     angles = [2.0 * np.arctan2(*starts.at(t).quaternion[2:]) for t in (1.0, 2.0)]
     assert angles == pytest.approx([0.5, 1.0])
+
+
+def test_a_rate_whose_square_underflows_is_no_clear() -> None:
+    slow = Motion(Pose(), (10, 0, 0), (0, 0, 1e-162), frame="body")
+    assert time_of_impact(cm.Sphere(0.5), slow, cm.Sphere(0.5), Motion(Pose((10, 0, 0)))).status == "hit"
+
+
+def test_round_off_decides_no_course() -> None:
+    """A velocity along the axis of rotation, and an acceleration across it, at any heading."""
+    for yaw in np.linspace(0.0, 6.0, 40):
+        pose = Pose((0, 0, 0), Pose.from_euler(0, 0, yaw).quaternion)
+        at = Motion(pose, (1, 0, 0), (0.1, 0, 0), (0, 2, 0), frame="body").at(2.0).position
+        assert pose.rotation.T @ at == pytest.approx((2, 4, 0))
+    aside = [Motion(Pose(), (10, 0, 0), (0, 0, w), (0, 3, 0), frame="body").at(2.0).position[1] for w in (0.0, 1e-12)]
+    assert aside == pytest.approx([6.0, 6.0])
+
+
+def test_a_body_that_reverses_is_followed_through_its_standstill() -> None:
+    """Its first state is exactly as old as it takes to stand."""
+    given = {"position": (0, 0, 0), "quaternion": (0, 0, 0, 1), "linear": (2, 0, 0), "angular": (0, 0, 0.1)}
+    wall = {"position": (-2, 0, 0), "quaternion": (0, 0, 0, 1), "linear": (0, 0, 0), "angular": (0, 0, 0)}
+    rows = states_of([{**given, "acceleration": (-1, 0, 0)}, {**wall, "acceleration": (0, 0, 0)}], BODY | VALID)
+    times = []
+    for age in (1.9, 2.0, 2.1):
+        monitor = cm.Monitor(Profile(stale_acceleration=0.0, horizon=6.0))
+        monitor.add(1, cm.Sphere(0.3))
+        monitor.add(2, cm.Box((0.2, 4, 4)))
+        monitor.step(SECOND, rows)
+        found = monitor.step(SECOND + round(age * SECOND), np.zeros(0, STATE)).predictions
+        times.append(age + float(found["lower"][0]))
+    assert times == pytest.approx([times[0]] * 3, abs=5e-3)
+
+
+def test_a_scene_in_the_plane_drops_the_acceleration_out_of_it() -> None:
+    monitor = cm.Monitor()
+    monitor.add(1, cm.Circle(0.3))
+    monitor.add(2, cm.Circle(0.3))
+    moving = {"position": (0, 0, 0), "quaternion": (0, 0, 0, 1), "linear": (2, 0, 0), "angular": (0, 0, 0)}
+    behind = {**moving, "position": (-3, 0, 0), "linear": (0, 0, 0), "acceleration": (0, 0, 0)}
+    rows = states_of([{**moving, "acceleration": (-1, 0, 9.81)}, behind], VALID | STOPS)
+    assert not len(monitor.step(SECOND, rows).predictions)
+
+
+def test_states_moved_twice_are_those_moved_once() -> None:
+    rng = np.random.default_rng(17)
+    given = [random_motion(rng, brakes=True, stops=bool(k % 2)) for k in range(40)]
+    for flags in (BODY | VALID, BODY | VALID | STOPS, VALID | STOPS, BODY):
+        rows = states_of(given, flags)
+        twice, once = moved_states(moved_states(rows, 0.2), 0.3), moved_states(rows, 0.5)
+        for name in ("position", "linear", "angular", "acceleration"):
+            np.testing.assert_allclose(twice[name], once[name], atol=1e-9)

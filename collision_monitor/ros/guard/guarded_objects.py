@@ -9,6 +9,8 @@ import numpy as np
 
 from collision_monitor.alerts.name_patterns import matches
 from collision_monitor.codec import ObjectDescriptionArray, ObjectStateArray, Removal
+from collision_monitor.motion.moved_states import in_world
+from collision_monitor.records import StateFlag
 from collision_monitor.ros.guard.speed_limit import PartPose
 
 
@@ -76,6 +78,9 @@ class GuardedObjects:
 
 
 def _pose(row: np.void) -> PartPose | None:
+    """Where a state (records.STATE) says an object is, and how it moves, in the world; None if it is not finite."""
+    if int(row["flags"]) & StateFlag.BODY_TWIST:
+        (row,) = in_world(np.array([row]))
     position, linear, angular = (tuple(row[name].tolist()) for name in ("position", "linear", "angular"))
     x, y, z, w = row["quaternion"].tolist()
     if not all(map(math.isfinite, (*position, x, y, z, w))):

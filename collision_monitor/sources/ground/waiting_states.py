@@ -12,6 +12,7 @@ from collision_monitor import records
 from collision_monitor.codec.states import COVARIANCE_SIZE
 from collision_monitor.errors import PoseError
 from collision_monitor.motion.moved_states import along_body, moved_states
+from collision_monitor.records import StateFlag
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.sources.ground.twist_estimate import TwistEstimator
 
@@ -149,7 +150,10 @@ class WaitingStates:
 def _advanced(states: Any, covariance: Floats, elapsed: NDArray[Any]) -> Any:
     """Return states (N,) after `elapsed` (N,) s on their courses; widen their uncertainty, also that in covariance."""
     states = moved_states(states, elapsed)
-    states["position_stddev"] = np.hypot(states["position_stddev"], states["velocity_stddev"] * elapsed)
+    own = (states["flags"] & StateFlag.BODY_TWIST) != 0  # an error of the heading turns the path
+    way = np.where(own, np.linalg.norm(states["linear"], axis=1), 0.0) * elapsed * states["orientation_stddev"]
+    speed = np.hypot(states["velocity_stddev"] * elapsed, np.nan_to_num(way))
+    states["position_stddev"] = np.hypot(states["position_stddev"], speed)
     states["orientation_stddev"] = np.hypot(states["orientation_stddev"], states["angular_velocity_stddev"] * elapsed)
     covariance[:, :6] += covariance[:, 6:] * elapsed[:, None] ** 2  # of independent errors
     return states

@@ -10,7 +10,7 @@ import numpy as np
 from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.geometry.vector import Vector, cross, dot
 from collision_monitor.impact.body_impact import Scratch, make_scratch
-from collision_monitor.motion.course import ARC, place_on, turned_for
+from collision_monitor.motion.course import ARC, STRAIGHT, place_on, turned_for
 from collision_monitor.motion.motion import MOTION, place_at
 from collision_monitor.motion.trigonometry import sin_cos
 from collision_monitor.uncertainty.samples.known_axes import AXES
@@ -128,28 +128,35 @@ def add_covariance(
 
 
 @inlined
-def add_arc_errors(m: Any, spread: Any, i: int, age: float, t: float, yaw_only: bool, work: Workspace) -> None:
+def add_arc_errors(
+    m: Any, spread: Any, i: int, age: float, times: tuple[float, float], yaw_only: bool, work: Workspace
+) -> None:  # fmt: skip
     """Add to work.joint how errors of orientation and angular velocity move body i, if it goes along an arc m (MOTION).
 
-    age: s since its last state; t: s from now.
+    age: s since its last state. times: that of the joint covariance (s from now), and the horizon.
     """
-    if m.course == ARC and t > 0.0:
+    if m.course == ARC:
+        t = times[0] if times[0] > 0.0 else times[1]  # when these errors are right
         pose, rate = spread.stddev[i, 1], spread.stddev[i, 3]
-        variance = pose * pose + rate * rate * (age * age + age * t + 0.25 * t * t)
-        _add_turned_path(m, variance, t, yaw_only, work.frame, work.joint, work.block)
+        harder = unknown_acceleration(spread, i, False, 1, 0.0) * (0.5 * age * age + t * (age + t / 6.0))
+        variance = pose * pose + rate * rate * (age * age + age * t + 0.25 * t * t) + harder * harder
+        _add_turned_path(m, variance, (times[0], t), yaw_only, work.frame, work.joint, work.block)
 
 
 @outlined
-def _add_turned_path(m: Any, variance: float, t: float, yaw_only: bool, frame: Any, joint: Any, C: Any) -> None:
+def _add_turned_path(
+    m: Any, variance: float, times: tuple[float, float], yaw_only: bool, frame: Any, joint: Any, C: Any
+) -> None:  # fmt: skip
     """Add to a joint covariance (6, 6) how a body on an arc m (MOTION) is moved by errors that turn its path.
 
-    variance: of the angle by which they turn the chord of the path until t (rad^2). frame (3, 3): axes of the
-    covariance; C (3, 3): scratch.
+    times: that of the covariance (s from now), and t, when these errors are right. variance: of the angle by which they
+    turn the chord of the path until t (rad^2). frame (3, 3): axes of the covariance; C (3, 3): scratch.
 
-    An error of its orientation turns the chord of its path until t (s from now); one of its angular velocity, which
-    grows, turns half of that. Both count as errors of the velocity that are right at t, independent of how they turn
+    An error of its orientation turns the chord of its path until t; one of its angular velocity, which grows, turns
+    half of that. Both count as errors of the velocity that are right at t, independent of how they turn
     the body.
     """
+    at, t = times
     moved = place_at(m, t).moved
     chord = (moved[0] / t, moved[1] / t, moved[2] / t)
     for r in range(3):
@@ -163,7 +170,7 @@ def _add_turned_path(m: Any, variance: float, t: float, yaw_only: bool, frame: A
                 C[r, c] = across[r] * across[c] * variance
     for part in range(3):
         row, column = 3 * (part == 2), 3 * (part > 0)
-        factor = (t * t, t, 1.0)[part]
+        factor = (at * at, at, 1.0)[part]
         for r in range(3):
             for c in range(3):
                 total = 0.0
@@ -291,12 +298,14 @@ def set_turn(m: Any, t: float, off: Any, yaw_only: bool, out: Any) -> None:
 
 
 @device
-def shift(work: Workspace, z: Any, t: float, p: Vector, v: Vector, w: Vector) -> None:
-    """Move body j by sample z (DIMENSIONS,): its velocity is v + the error, its position p + the error at t.
+def shift(work: Workspace, z: Any, t: float, stated: Any) -> None:
+    """Move body j by sample z (DIMENSIONS,): its velocity is off by the error, its position at t by the other one.
 
-    w: its stated angular velocity, with which the errors of a body on an arc turn.
+    If only body i goes straight, it is moved the other way, because an error of i does not end where j stands. stated:
+    position and velocity of i, and those of j and its angular velocity, with which the errors of a body on an arc turn.
     """
-    B, L, F, y = work.motion[1], work.joint, work.frame, work.block
+    A, B, L, F, y = work.motion[0], work.motion[1], work.joint, work.frame, work.block
+    (p_i, v_i), (p, v, w) = stated
     for r in range(6):
         value = 0.0
         for c in range(r + 1):
@@ -305,10 +314,16 @@ def shift(work: Workspace, z: Any, t: float, p: Vector, v: Vector, w: Vector) ->
     dx = y[1, 0] * F[0, 0] + y[1, 1] * F[1, 0] + y[1, 2] * F[2, 0]
     dy = y[1, 0] * F[0, 1] + y[1, 1] * F[1, 1] + y[1, 2] * F[2, 1]
     dz = y[1, 0] * F[0, 2] + y[1, 1] * F[1, 2] + y[1, 2] * F[2, 2]
+    off_x = y[0, 0] * F[0, 0] + y[0, 1] * F[1, 0] + y[0, 2] * F[2, 0]
+    off_y = y[0, 0] * F[0, 1] + y[0, 1] * F[1, 1] + y[0, 2] * F[2, 1]
+    off_z = y[0, 0] * F[0, 2] + y[0, 1] * F[1, 2] + y[0, 2] * F[2, 2]
+    if A.course == STRAIGHT and B.course != STRAIGHT:
+        A.vx, A.vy, A.vz = v_i[0] - dx, v_i[1] - dy, v_i[2] - dz
+        A.x, A.y, A.z = p_i[0] - off_x + t * dx, p_i[1] - off_y + t * dy, p_i[2] - off_z + t * dz
+        B.vx, B.vy, B.vz = v
+        return
     B.vx, B.vy, B.vz = v[0] + dx, v[1] + dy, v[2] + dz
     mx, my, mz = t * dx, t * dy, t * dz
     if B.course == ARC:  # the error turns with the body
         mx, my, mz = place_on(ARC, (dx, dy, dz), w, (0.0, 0.0, 0.0), t, inf).moved
-    B.x = p[0] + y[0, 0] * F[0, 0] + y[0, 1] * F[1, 0] + y[0, 2] * F[2, 0] - mx
-    B.y = p[1] + y[0, 0] * F[0, 1] + y[0, 1] * F[1, 1] + y[0, 2] * F[2, 1] - my
-    B.z = p[2] + y[0, 0] * F[0, 2] + y[0, 1] * F[1, 2] + y[0, 2] * F[2, 2] - mz
+    B.x, B.y, B.z = p[0] + off_x - mx, p[1] + off_y - my, p[2] + off_z - mz
