@@ -202,9 +202,7 @@ def _onward(braking: Braking, pair: NearPair, base: PartPose, motion: Twist2, le
     The nearest point tells nothing of that: a hall as one mesh is near at the side, and meets the robot in front.
     Infinite for a command that does not go on as the robot moves.
     """
-    ahead, left = cos(base.heading), sin(base.heading)  # the commands are along the robot's axes
-    x, y, _ = base.linear
-    now = Twist2(ahead * x + left * y, ahead * y - left * x, base.angular[2])
+    now = Twist2(base.linear[0], base.linear[1], base.angular[2])
     goes_on = motion.x * now.x + motion.y * now.y > 0.0 or motion.turn * now.turn > 0.0
     if not isfinite(pair.time) or not goes_on:
         return inf

@@ -7,7 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from collision_monitor.codec import AlertLevel
+from collision_monitor import ObjectDescription, Sphere
+from collision_monitor.codec import AlertLevel, ObjectDescriptionArray, ObjectStateArray
+from collision_monitor.records import STATE, StateFlag
+from collision_monitor.ros.guard.guarded_objects import GuardedObjects
 from collision_monitor.ros.guard.speed_limit import PASSES, Braking, NearPair, PartPose, Twist2, limited, verdict
 
 BRAKING = Braking(deceleration=1.5, reaction=0.2, clearance=0.1)
@@ -158,3 +161,26 @@ def test_the_limit_scales_a_command_and_names_itself() -> None:
     assert limited(PASSES, Twist2(1.0, 0.0, 0.3), 1.5) == PASSES
     assert limited(PASSES, Twist2(0.0, 0.0, 0.3), 0.0) == PASSES  # in place
     assert limited(PASSES, Twist2(0.1, 0.0, 0.0), 0.0).factor == 0.0
+
+
+@pytest.mark.parametrize("heading", np.linspace(-3.0, 3.0, 9))
+def test_the_factor_does_not_depend_on_where_the_robot_looks(heading: float) -> None:
+    """It drives at 0.8 m/s toward an impact that is predicted in 1 s, with a near wall at its left."""
+    factors = []
+    for turned in (0.0, heading):
+        side = alert(0.3, AlertLevel.CAUTION, direction=turned + math.pi / 2, time=0.3)
+        pose = at(turned, 0.8 * math.cos(turned), 0.8 * math.sin(turned))
+        factors.append(factor(side, Twist2(0.8, 0, 0), pose=pose))
+    assert factors[1] == pytest.approx(factors[0])
+    assert factors[0] < 1.0
+
+
+def test_a_state_along_the_robots_own_axes_is_turned_to_the_world() -> None:
+    row = np.zeros(1, STATE)
+    row["id"], row["quaternion"], row["linear"] = 7, (0, 0, math.sin(math.pi / 4), math.cos(math.pi / 4)), (1, 0, 0)
+    row["flags"] = StateFlag.BODY_TWIST
+    guarded = GuardedObjects(("robot",), "robot")
+    guarded.describe(ObjectDescriptionArray(0, "map", False, (ObjectDescription(7, Sphere(0.5), name="robot"),)))
+    guarded.move(ObjectStateArray(5, "map", 0, row, np.empty(0)), 1.0)
+    assert guarded.states[7].pose.linear == pytest.approx((0, 1, 0))
+    assert guarded.states[7].pose.heading == pytest.approx(math.pi / 2)
