@@ -14,7 +14,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import device, inlined, kernel
+from collision_monitor._jit import device, inlined, kernel, outlined
 from collision_monitor.geometry.vector import magnitude
 from collision_monitor.motion.course import ARC
 from collision_monitor.records import StateFlag
@@ -140,19 +140,22 @@ def swing_radius(bodies: Any, spread: Spread, i: int) -> float:
     return 0.0 if is_upright else bodies.spin_radius[i]
 
 
-@device
+@inlined
 def unknown_acceleration(spread: Spread, i: int, silent: bool, which: int, stale_acceleration: float) -> float:
     """Standard deviation along one axis of body i's unknown acceleration: m/s^2 (which 0) or rad/s^2 (which 1).
 
     A stale object widens its spread here: a silent body without a declared bound may accelerate by stale_acceleration.
     """
-    declared = spread.acceleration[i, which]
-    if declared > 0.0:
-        return FIFTH_ROOT * declared
-    return FIFTH_ROOT * stale_acceleration if silent and which == 0 else 0.0
+    return _unknown(spread.acceleration[i, which], stale_acceleration if silent and which == 0 else 0.0)
 
 
-@device
+@inlined
+def _unknown(declared: float, otherwise: float) -> float:
+    """Standard deviation along one axis of an acceleration anywhere in a ball, of a declared radius or another one."""
+    return FIFTH_ROOT * (declared if declared > 0.0 else otherwise)
+
+
+@inlined
 def surface_spread(
     bodies: Any, spread: Spread, i: int, radius: float, age: float, ahead: float, stale_acceleration: float
 ) -> tuple[float, float]:
@@ -162,21 +165,34 @@ def surface_spread(
     so that the bound is linear in time and never too low. An error of the orientation turns the path of a body on an
     arc too.
     """
-    s_p, s_o = spread.stddev[i, 0], spread.stddev[i, 1]
-    s_v, s_w = spread.stddev[i, 2], spread.stddev[i, 3]
-    silent = unknown_acceleration(spread, i, age > 0.0, 0, stale_acceleration)
-    ahead_a = unknown_acceleration(spread, i, False, 0, stale_acceleration)
-    turning = unknown_acceleration(spread, i, False, 1, stale_acceleration)
+    s, a = spread.stddev, (spread.acceleration[i, 0], spread.acceleration[i, 1])
+    fastest = 0.0
+    if bodies.course[i] == ARC:
+        v, a_i = bodies.linear, bodies.acceleration
+        fastest = magnitude((v[i, 0], v[i, 1], v[i, 2]))
+        if bodies.rest[i] == inf:
+            fastest += magnitude((a_i[i, 0], a_i[i, 1], a_i[i, 2])) * (age + ahead)
+    return _surface_spread(
+        (s[i, 0], s[i, 1], s[i, 2], s[i, 3]), a, radius, age, ahead, stale_acceleration, fastest
+    )  # fmt: skip
+
+
+@outlined
+def _surface_spread(
+    stddevs: tuple[float, float, float, float], bounds: tuple[float, float], radius: float, age: float, ahead: float,
+    stale_acceleration: float, fastest: float,
+) -> tuple[float, float]:  # fmt: skip
+    """`surface_spread` of the numbers of a body. fastest: its largest speed on an arc (m/s), else 0."""
+    s_p, s_o, s_v, s_w = stddevs
+    silent = _unknown(bounds[0], stale_acceleration if age > 0.0 else 0.0)
+    ahead_a, turning = _unknown(bounds[0], 0.0), _unknown(bounds[1], 0.0)
     now = s_p + s_v * age + 0.5 * silent * age * age
     growth = s_v + silent * age + 0.5 * ahead_a * ahead
     if s_o + s_w + turning > 0.0:  # else 0 * inf for a half-space, which does not turn
         now += radius * (s_o + s_w * age + 0.5 * turning * age * age)
         growth += radius * (s_w + turning * (age + 0.5 * ahead))
-        if bodies.course[i] == ARC:
-            v = bodies.linear[i, 0], bodies.linear[i, 1], bodies.linear[i, 2]
-            a = bodies.acceleration[i, 0], bodies.acceleration[i, 1], bodies.acceleration[i, 2]
+        if fastest > 0.0:
             whole = age + ahead
             off = s_o + s_w * whole + 0.5 * turning * whole * whole
-            fastest = magnitude(v) + (magnitude(a) * whole if bodies.rest[i] == inf else 0.0)
             now, growth = now + fastest * age * off, growth + fastest * off
     return now, growth

@@ -55,7 +55,7 @@ def contact_of_chains(
     set_rotation(scratch, ai, aj, ak, aw, rotation[0])
     set_rotation(scratch, bi, bj, bk, bw, rotation[1])
     p = bx - ax, by - ay, bz - az
-    return _contact(table, parts, (np.int32(a), np.int32(b)), (ax, ay, az), p, limit, effort, scratch, row)
+    return placed_contact(table, parts, (np.int32(a), np.int32(b)), (ax, ay, az), p, limit, effort, scratch, row)
 
 
 @kernel
@@ -76,11 +76,11 @@ def contacts_of_chains(
             quaternion_to_matrix(x_b[:, 3:7], j, R[1])
             origin = x_a[i, 0], x_a[i, 1], x_a[i, 2]
             p = x_b[j, 0] - origin[0], x_b[j, 1] - origin[1], x_b[j, 2] - origin[2]
-            _contact(table, parts, chains, origin, p, inf, effort, scratch, rows[k])
+            placed_contact(table, parts, chains, origin, p, inf, effort, scratch, rows[k])
 
 
 @outlined
-def _contact(
+def placed_contact(
     table: ShapeTable, parts: Parts, chains: Any, origin: Vector, p: Vector, limit: float, effort: int,
     scratch: Scratch, row: Any,
 ) -> tuple[float, float]:  # fmt: skip

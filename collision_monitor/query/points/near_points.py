@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import kernel
-from collision_monitor.impact.body_contact import RESULT, chains_contact
+from collision_monitor.impact.body_contact import RESULT
 from collision_monitor.impact.mesh_pair import SURFACES
 from collision_monitor.motion.bodies import chain_radius
-from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.query.body import QueryBody, kept_slots
-from collision_monitor.query.contact.contact_kernel import MEMORY
+from collision_monitor.query.contact.contact_kernel import MEMORY, placed_contact
 from collision_monitor.query.library import LIBRARY
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Points
@@ -50,9 +49,12 @@ def _near_points(
     R (2, 3, 3), p (3,): rotations of both, and position of the second one, in the frame of the points.
     """
     reach = chain_radius(table, parts, chains[0]) + chain_radius(table, parts, chains[1]) + limit
+    for side in range(2):
+        for r in range(3):
+            for c in range(3):
+                scratch.rotation[side, r, c] = R[side, r, c]
     for k in range(len(points)):
         x = p[0] - points[k, 0], p[1] - points[k, 1], p[2] - points[k, 2]
         if x[0] * x[0] + x[1] * x[1] + x[2] * x[2] <= reach * reach:
-            pose = PairPose(R[0], R[1], x)
-            found, _ = chains_contact(table, parts, chains[0], chains[1], pose, limit, SURFACES, scratch, row)
+            found, _ = placed_contact(table, parts, chains, (0.0, 0.0, 0.0), x, limit, SURFACES, scratch, row)
             near[k] = found < inf
