@@ -18,7 +18,7 @@ from collision_monitor.alerts.measures import Array, Slots
 from collision_monitor.alerts.monitored_bodies import MonitoredBodies
 from collision_monitor.impact.body_contact import RESULT, ContactQuery, body_contact
 from collision_monitor.narrow_phase.contact_row import BOUND, DISTANCE, NORMAL
-from collision_monitor.uncertainty.uncertainty import body_has_mesh
+from collision_monitor.uncertainty.sampled_impacts import body_has_mesh
 
 MOST: Final = 65
 """Most distances of a pair."""

@@ -31,16 +31,16 @@ from collision_monitor.uncertainty.impact_distribution import EARLIEST, MOST_LIK
 from collision_monitor.uncertainty.near_pairs import NearPairRange, find_near
 from collision_monitor.uncertainty.plane_memory import PlaneMemory, make_plane_memory
 from collision_monitor.uncertainty.plane_probability import LEFT, plane_probabilities
-from collision_monitor.uncertainty.samples.error_samples import Workspace, make_workspace
-from collision_monitor.uncertainty.samples.normal_samples import normal_samples, sample_columns
-from collision_monitor.uncertainty.spread import FIFTH_ROOT, Spread, is_uncertain, make_spread, take_spread
-from collision_monitor.uncertainty.uncertainty import (
+from collision_monitor.uncertainty.sampled_impacts import (
     COSTLY_PARTS,
     SPINNING_PARTS,
     Sampling,
     find_divisors,
     impact_probabilities,
 )
+from collision_monitor.uncertainty.samples.error_samples import Workspace, make_workspace
+from collision_monitor.uncertainty.samples.normal_samples import normal_samples, sample_columns
+from collision_monitor.uncertainty.spread import FIFTH_ROOT, Spread, is_uncertain, make_spread, take_spread
 
 Pool = ThreadPoolExecutor | None
 """Threads that share the work; None: one thread."""

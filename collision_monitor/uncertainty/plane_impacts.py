@@ -43,13 +43,13 @@ from collision_monitor.uncertainty.pair_errors import (
     turning_rate,
 )
 from collision_monitor.uncertainty.quiet_segments import stay_apart
+from collision_monitor.uncertainty.sampled_impacts import SAMPLE_TOLERANCE
 from collision_monitor.uncertainty.samples.chosen_samples import choose_samples
 from collision_monitor.uncertainty.samples.normal_samples import FURTHEST
 from collision_monitor.uncertainty.samples.sample_count import latest
 from collision_monitor.uncertainty.samples.sample_gaps import set_samples
 from collision_monitor.uncertainty.samples.straight_samples import draw_evenly, set_errors
 from collision_monitor.uncertainty.screening import meeting
-from collision_monitor.uncertainty.uncertainty import SAMPLE_TOLERANCE
 
 FACETS: Final = 0.02
 """Distance between the planes and the obstacle, in standard deviations of the gap, up to which no plane is added."""

@@ -1,8 +1,8 @@
 """Time and probability of impact of two bodies with uncertain states, from planes that bound the obstacle.
 
-`uncertainty.py` follows each sample as exactly as the stated motion. Here the samples meet planes (plane_impacts.py),
+`sampled_impacts.py` follows each sample as exactly as the stated motion. Here the samples meet planes (plane_impacts.py),
 which costs a few products for each plane and sample, or have a closed form (round_impacts.py). Pairs with a mesh, or
-that turn very fast, are left to `uncertainty.py`. docs/uncertainty.md describes the method.
+that turn very fast, are left to `sampled_impacts.py`. docs/uncertainty.md describes the method.
 """
 
 from __future__ import annotations
@@ -35,18 +35,18 @@ from collision_monitor.uncertainty.pair_errors import (
 )
 from collision_monitor.uncertainty.plane_impacts import enter_bodies, enter_surely
 from collision_monitor.uncertainty.round_impacts import NOT_ROUND, enter_round_bodies, round_form
-from collision_monitor.uncertainty.samples.error_samples import orientation_spread, set_frame, take_root
-from collision_monitor.uncertainty.samples.sample_gaps import TURNED_FARTHEST
-from collision_monitor.uncertainty.screening import GapGrowth, design_point
-from collision_monitor.uncertainty.spread import is_uncertain, surface_spread, swing_radius, turns_by_yaw
-from collision_monitor.uncertainty.sure_contact import surely_meet
-from collision_monitor.uncertainty.uncertainty import (
+from collision_monitor.uncertainty.sampled_impacts import (
     SAMPLE_TOLERANCE,
     body_has_mesh,
     first_contact,
     likely_contact,
     right_time,
 )
+from collision_monitor.uncertainty.samples.error_samples import orientation_spread, set_frame, take_root
+from collision_monitor.uncertainty.samples.sample_gaps import TURNED_FARTHEST
+from collision_monitor.uncertainty.screening import GapGrowth, design_point
+from collision_monitor.uncertainty.spread import is_uncertain, surface_spread, swing_radius, turns_by_yaw
+from collision_monitor.uncertainty.sure_contact import surely_meet
 
 LEFT: Final = -1.0
 """Probability of a pair that this method does not answer: very fast rotation, large errors of orientation, a mesh."""

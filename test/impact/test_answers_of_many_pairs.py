@@ -9,9 +9,9 @@ from collision_monitor.monitor.uncertain_predictions import sigmas_for
 from collision_monitor.settings.profile import Profile
 from collision_monitor.uncertainty.plane_memory import make_plane_memory
 from collision_monitor.uncertainty.plane_probability import plane_probabilities
+from collision_monitor.uncertainty.sampled_impacts import Sampling
 from collision_monitor.uncertainty.samples.error_samples import make_workspace
 from collision_monitor.uncertainty.samples.normal_samples import normal_samples, sample_columns
-from collision_monitor.uncertainty.uncertainty import Sampling
 from collision_monitor.world import make_scene
 
 SAMPLES = 256

@@ -11,9 +11,9 @@ from collision_monitor.monitor.uncertain_predictions import ENTRY, sigmas_for
 from collision_monitor.records import STATE
 from collision_monitor.settings.profile import Profile
 from collision_monitor.uncertainty.near_pairs import NearPairRange, find_near
+from collision_monitor.uncertainty.sampled_impacts import Sampling, impact_probabilities
 from collision_monitor.uncertainty.samples.error_samples import make_workspace
 from collision_monitor.uncertainty.samples.normal_samples import normal_samples
-from collision_monitor.uncertainty.uncertainty import Sampling, impact_probabilities
 from collision_monitor.world import make_scene
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.impact.body_impact import ImpactQuery
 from collision_monitor.uncertainty.plane_memory import ChosenSamples, make_plane_memory
+from collision_monitor.uncertainty.sampled_impacts import Sampling
 from collision_monitor.uncertainty.samples.chosen_samples import choose_samples
 from collision_monitor.uncertainty.samples.normal_samples import (
     BASE,
@@ -18,7 +19,6 @@ from collision_monitor.uncertainty.samples.normal_samples import (
     normal_samples,
     sample_columns,
 )
-from collision_monitor.uncertainty.uncertainty import Sampling
 
 COUNT = 1024
 COLUMNS = sample_columns(COUNT)

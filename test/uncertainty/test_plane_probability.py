@@ -1,4 +1,4 @@
-"""Probabilities by cutting planes, against the slow method that follows each sample exactly (uncertainty.py)."""
+"""Probabilities by cutting planes, against the slow method that follows each sample exactly (sampled_impacts.py)."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from collision_monitor.uncertainty.pair_errors import ROUNDING
 from collision_monitor.uncertainty.plane_impacts import FACETS
 from collision_monitor.uncertainty.plane_memory import make_plane_memory
 from collision_monitor.uncertainty.plane_probability import LEFT, plane_probabilities
+from collision_monitor.uncertainty.sampled_impacts import Sampling, impact_probabilities
 from collision_monitor.uncertainty.samples.error_samples import make_workspace
 from collision_monitor.uncertainty.samples.normal_samples import normal_samples, sample_columns
-from collision_monitor.uncertainty.uncertainty import Sampling, impact_probabilities
 
 SAMPLES = 1024
 SHAPES = {
