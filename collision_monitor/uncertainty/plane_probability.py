@@ -1,6 +1,6 @@
 """Time and probability of impact of two bodies with uncertain states, from planes that bound the obstacle.
 
-`sampled_impacts.py` follows each sample as exactly as the stated motion. Here the samples meet planes (plane_impacts.py),
+`sampled_impacts.py` follows each sample exactly. Here the samples meet planes (plane_impacts.py),
 which costs a few products for each plane and sample, or have a closed form (round_impacts.py). Pairs with a mesh, or
 that turn very fast, are left to `sampled_impacts.py`. docs/uncertainty.md describes the method.
 """
