@@ -80,7 +80,7 @@ def quaternion_to_matrix(q: Any, i: int, out: Any) -> None:
 
 
 @outlined
-def turned_at(m: Any, t: float) -> float:
+def turned_until(m: Any, t: float) -> float:
     """Time (s) in which the motion m (MOTION) turns at its first rate as far as until time t, see `turned_for`."""
     return turned_for(m.course, (m.vx, m.vy, m.vz), (m.ax, m.ay, m.az), t - m.time, m.rest - m.time)
 
@@ -95,7 +95,7 @@ def rotation_at(m: Any, t: float, out: Any) -> None:
     rate = sqrt(m.wx * m.wx + m.wy * m.wy + m.wz * m.wz)
     angle = rate * (t - m.time)
     if m.course != STRAIGHT:
-        angle = rate * turned_at(m, t)
+        angle = rate * turned_until(m, t)
     if angle == 0.0:
         for i in range(3):
             for j in range(3):

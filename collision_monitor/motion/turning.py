@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from collision_monitor._jit import device
 from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.motion.course import STRAIGHT
-from collision_monitor.motion.motion import chord_angle, turned_at
+from collision_monitor.motion.motion import chord_angle, turned_until
 from collision_monitor.motion.trigonometry import LARGEST, sin_cos_within
 
 BLOCK: Final = 128
@@ -44,7 +44,7 @@ def turned_away(bodies: Any, start: int, count: int, columns: Any, angles: Any) 
         columns[8, k], columns[9, k], columns[10, k] = m.wx, m.wy, m.wz
         columns[11, k] = bodies.time[i] - m.time
         if m.course != STRAIGHT:
-            columns[11, k] = turned_at(m, bodies.time[i])
+            columns[11, k] = turned_until(m, bodies.time[i])
     for k in range(count):
         x, y, z, w = columns[0, k], columns[1, k], columns[2, k], columns[3, k]
         wx, wy, wz = columns[8, k], columns[9, k], columns[10, k]

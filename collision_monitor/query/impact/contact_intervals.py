@@ -38,6 +38,9 @@ class ContactInterval:
     entry: there is no contact before the first, and there is at the second. exit: there is contact until the first, and
     none at the second, which is infinite if the contact lasts to the horizon, or if no later time without it was found.
     An entry with an infinite second time is unresolved: treat it as a contact from the first time on.
+
+    >>> ContactInterval(entry=(0.5, 0.5000001), exit=(0.75, 0.7500002)).exit[0]
+    0.75
     """
 
     entry: tuple[float, float]
