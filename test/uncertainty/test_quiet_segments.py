@@ -30,7 +30,9 @@ def apart(shapes: list[cm.Shape], rows: np.ndarray, root: np.ndarray, turned: fl
     A, B = work.motion
     radii = (float(bodies.spin_radius[0]), float(bodies.spin_radius[1]))
     turning = ((turned, 0.0, 0.0, 0.0), (turned, 0.0, 0.0, 0.0))
-    bend = float(surface_bend(A, radii[0], 2.0) + surface_bend(B, radii[1], 2.0)) if spin_rate(A) + spin_rate(B) > 0.0 else 0.0
+    bend = 0.0
+    if spin_rate(A) + spin_rate(B) > 0.0:
+        bend = float(surface_bend(A, radii[0], window.end) + surface_bend(B, radii[1], window.end))
     errors = PairErrors(Tube(0.0, 0.0), turning, bend, float(root[0, 0]), 0.0, 0.0, radii, ABOUT_ALL)
     pair = ShapePair(A, B, bodies.first_shape[0], bodies.first_shape[1])
     set_nodes(table, parts, pair, window, window.end - window.begin, turning, ABOUT_ALL, work.scratch, obstacle)
