@@ -1,4 +1,4 @@
-"""Compare predictions with what really happens: things that turn, brake, fall and swing, by what the monitor is told.
+"""Compare predictions with what really happens: things that turn, brake, fall and swing, by what its states say.
 
 Each encounter is simulated: a body moves as a real one does, another one stands, or crosses its way. The monitor gets
 one state of each and predicts. A prediction is false if it is certain and the bodies do not meet within the horizon;
@@ -191,7 +191,7 @@ def along_z(path: Path3) -> Path3:
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of encounter: what moves, what it meets, and what the monitor may be told of it."""
+    """A kind of encounter: what moves, what it meets, and what its states may say of it."""
 
     name: str
     make: Make
@@ -368,7 +368,7 @@ def draw(results: dict[tuple[str, str, float], Score], path: Path) -> None:
         axis.set_xticks([])
     axes[0].set_yticks(place, [f"{kind.name}: {model}" for kind, model in rows], fontsize=8)
     figure.suptitle(
-        "What a prediction is worth, by what the monitor is told of the motion (2 s ahead)", x=0.01, ha="left"
+        "What a prediction is worth, by what the states say of the motion (2 s ahead)", x=0.01, ha="left"
     )
     figure.tight_layout()
     figure.savefig(path, dpi=120)
@@ -385,7 +385,7 @@ def main() -> int:
     args = parser.parse_args()
     count, ticks = 200 if args.quick else args.count, np.arange(0.0, HORIZONS[-1] + TICK, TICK)
     results: dict[tuple[str, str, float], Score] = {}
-    print("| What moves | the monitor is told | horizon (s) | true | false | missed | late | error p99 (ms) |")
+    print("| What moves | its states say | horizon (s) | true | false | missed | late | error p99 (ms) |")
     print("|---|---|---|---|---|---|---|---|")
     for kind in KINDS:
         if args.only not in kind.name:
