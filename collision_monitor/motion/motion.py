@@ -60,8 +60,8 @@ MOTION = np.dtype(
 FEWEST_PIECES: Final = 4
 MOST_PIECES: Final = 32
 PIECE: Final = 0.5
-"""Pieces of the path of a motion that bends, of which its swept box consists: least and largest number, and the angle
-(rad) between. Smaller: narrower boxes, by 3 % of the radius of an arc for 0.5. Each piece costs 60 ns."""
+"""How the path of a motion that bends is divided for its swept box: least and largest number of pieces, and the angle
+(rad) of a piece between. Smaller: narrower boxes, by 3 % of the radius of an arc for 0.5. Each piece costs 60 ns."""
 
 
 @inlined
@@ -190,7 +190,7 @@ def pair_state(A: Any, B: Any, t: float) -> PairState:
 
 @outlined
 def _bent_state(A: Any, B: Any, t: float) -> PairState:
-    """`pair_state` of two motions of which one is not straight."""
+    """`pair_state` of two motions if at least one is not straight."""
     a, b = place_at(A, t), place_at(B, t)
     p = (
         B.x - A.x + (b.moved[0] - a.moved[0]),

@@ -132,7 +132,7 @@ def test_a_frame_that_is_neither_is_refused() -> None:
 
 
 def meeting_pair(rng: np.random.Generator) -> tuple[Motion, Motion]:
-    """Two motions, of which one or both bend or brake, that come near each other at some time."""
+    """Two motions that come near each other at some time; at least one bends or brakes."""
     one = stated(random_motion(rng, brakes=bool(rng.integers(2)), stops=bool(rng.integers(2))))
     given = random_motion(rng, brakes=bool(rng.integers(2)), stops=bool(rng.integers(2)))
     kind, t = rng.integers(3), rng.uniform(0.2, 1.8)
@@ -148,7 +148,7 @@ def meeting_pair(rng: np.random.Generator) -> tuple[Motion, Motion]:
 
 
 def least_distance(a: Any, one: Motion, b: Any, other: Motion, times: Array) -> float:
-    """Least distance at some times, of which the error is taken off."""
+    """Least distance at some times, less its error."""
     found = (contact(a, one.at(t), b, other.at(t)) for t in times)
     return min((each.signed_distance - each.error_bound for each in found), default=inf)
 

@@ -12,9 +12,9 @@ from collision_monitor._jit import kernel
 from collision_monitor.checks.numbers import checked_whole
 from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.impact.mesh_pair import SURFACES
+from collision_monitor.meshes.advance.approach import time_until
 from collision_monitor.motion.motion import MOTION, half_acceleration, most_turning, relative_velocity
 from collision_monitor.motion.stated_motion import Motion
-from collision_monitor.query.body import QueryBody
 from collision_monitor.query.contact.contact import check_kinds, plant_bodies
 from collision_monitor.query.contact.contact_kernel import contact_row
 from collision_monitor.query.contact.open_gap import location_of
@@ -24,7 +24,6 @@ from collision_monitor.query.impact.moving_body import MovingBody, check_bounded
 from collision_monitor.query.impact.time_of_impact import time_of_impact
 from collision_monitor.shapes.compound import Compound
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.reach import reach
 
 STEPS: Final = 400
 """Most contacts that are computed on the way to an exit. Each step takes the share of the overlap that the body would
@@ -95,7 +94,9 @@ def impacts(
 def _exit(a: MovingBody, b: MovingBody, begin: float, query: MotionQuery) -> tuple[float, float]:
     """Until when the contact lasts that there is at `begin` (s), and a time without it; see ContactInterval."""
     t, horizon, numbers = begin, query.horizon, np.array([[*m.pose.numbers, *m.numbers] for m in (a.motion, b.motion)])
-    arms, memory, bounds = np.array([_arm(a.body), _arm(b.body)]), np.zeros(2, MOTION), np.empty(2)
+    # a half-space, of infinite radius, does not turn
+    arms = np.array([each.body.radius if each.body.radius < inf else 0.0 for each in (a, b)])
+    memory, stay = np.zeros(2, MOTION), np.empty(2)
     slots, later = (a.body.slots.first, b.body.slots.first), 0.0
     for _ in range(STEPS):
         now = a.motion.at(t + later), b.motion.at(t + later)
@@ -103,9 +104,8 @@ def _exit(a: MovingBody, b: MovingBody, begin: float, query: MotionQuery) -> tup
         gap -= query.separation
         if gap - bound > 2.0 * query.tolerance and not _is_inside(a, b, now):
             return t, t + later
-        _fastest(memory, numbers, t + later, horizon, arms, bounds)
-        speed, bend = bounds.tolist()
-        step = _time_until(-(gap + bound), speed, bend)
+        _stay(memory, numbers, t + later, horizon, arms, -(gap + bound), stay)
+        speed, step = stay.tolist()
         if gap + bound < -0.5 * query.tolerance and step > 0.0:
             t, later = t + later + step, 0.0
             if not t < horizon:
@@ -126,30 +126,16 @@ def _is_inside(a: MovingBody, b: MovingBody, now: tuple[Pose, Pose]) -> bool:
     return any(place != Location.OUTSIDE for place in location_of(a.body, now[0], b.body, now[1]))
 
 
-def _arm(body: QueryBody) -> float:
-    """Distance (m) of the farthest point of a body from its origin; 0 for a half-space, which does not turn."""
-    farthest = float(np.linalg.norm(reach(body.pieces, np.eye(3))))
-    return farthest if farthest < inf else 0.0
-
-
-def _time_until(depth: float, speed: float, bend: float) -> float:
-    """Time (s) in which points move by a depth (m) at most: speed d + bend d^2 = depth."""
-    if not depth > 0.0:
-        return 0.0
-    root = sqrt(speed * speed + 4.0 * bend * depth)
-    return 2.0 * depth / (speed + root) if speed + root > 0.0 else inf
-
-
 @kernel
-def _fastest(motion: Any, numbers: Any, t: float, until: float, arms: Any, bounds: Any) -> None:
-    """Write how fast points of two motions may move relative to each other from t on (m/s, m/s^2), to bounds (2,).
+def _stay(motion: Any, numbers: Any, t: float, until: float, arms: Any, depth: float, stay: Any) -> None:
+    """Write how fast points of two motions may part from t on (m/s), and how long (s) a depth (m) lasts, to stay (2,).
 
-    numbers (2, NUMBERS): of both motions; motion (2,) MOTION: memory. arms (2,): their farthest points (m).
+    numbers (2, NUMBERS): of both motions; motion (2,) MOTION: memory. arms (2,): radii (m) about their origins.
     """
     A, B = motion[0], motion[1]
     set_motion(A, numbers, 0)
     set_motion(B, numbers, 1)
     v = relative_velocity(A, B, t)
     turning = most_turning(A, t, until) * arms[0] + most_turning(B, t, until) * arms[1]
-    bounds[0] = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) + turning
-    bounds[1] = half_acceleration(A, B, t, until)
+    stay[0] = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) + turning
+    stay[1] = time_until(depth, stay[0], 2.0 * half_acceleration(A, B, t, until))
