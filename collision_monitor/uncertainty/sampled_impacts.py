@@ -91,7 +91,8 @@ for 5 s beside a floor, 64 reach a time before the impact, which counts as one. 
 
 SEARCH_ITERATIONS: Final = 8
 """Iterations of the search for a sample's impact with one mesh: 4,000 boxes or 1.2 ms. Ordinary ones take a tenth. Each
-sample of a disc of 100 km that turns beside a mesh took 20 ms."""
+sample of a disc of 100 km that turns beside a mesh took 20 ms. The same for bodies that turn too far for any search,
+see `spins`: SPINNING_ITERATIONS took 1 ms a sample and reached no later time."""
 
 PILOT_PART: Final = 0.2
 """A pair that is stated to pass is left out if it meets with less than this fraction of min_probability in the first
@@ -474,7 +475,9 @@ def impact_probabilities(
         if not has_mesh:
             coarse = min(coarse, _least_tolerance(multibody, i, j, (turn_i, turn_j), t, query.margin, work))
         coarse = max(query.tolerance, coarse)
-        if spins_far(A, B, horizon) and not is_one_search:
+        if spins(A, B, horizon):
+            iterations = min(iterations, SEARCH_ITERATIONS)
+        elif spins_far(A, B, horizon) and not is_one_search:
             iterations = max(iterations, SPINNING_ITERATIONS)
         roughly = ImpactQuery(query.margin, coarse, iterations)
         begin = safe if safe < inf else 0.0
