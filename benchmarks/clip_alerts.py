@@ -18,14 +18,14 @@ from collision_monitor.alerts.rules import Rules
 from collision_monitor.alerts.thresholds import LEVELS
 from collision_monitor.codec import CollisionAlert, decode_alert, encode_descriptions, encode_states
 from collision_monitor.pipeline.pipeline import Pipeline
-from collision_monitor.world.trajectory import FRAME_RATE, Trajectory
+from collision_monitor.world.recorded_tracks import FRAME_RATE, RecordedTracks
 
 ROOT = Path(__file__).parents[1]
 
 
 def play(prefix: Path, rules: Rules) -> tuple[dict[tuple[int, int], list[int]], list[CollisionAlert]]:
     """Return the frames with a prediction of each pair of a cart and a person, and the alerts."""
-    scene = Trajectory(None, None, prefix)
+    scene = RecordedTracks(None, None, prefix)
     pipeline = Pipeline(rules=rules)
     pipeline.on_shapes(encode_descriptions(0, "world", scene.descriptions))
     carts = {each.object_id for each in scene.descriptions if "cart" in each.name}

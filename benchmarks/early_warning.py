@@ -24,7 +24,7 @@ from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import rotation_matrix
 from collision_monitor.shapes.shape_table import ShapeTableBuilder
-from collision_monitor.world.trajectory import FRAME_RATE, Trajectory
+from collision_monitor.world.recorded_tracks import FRAME_RATE, RecordedTracks
 
 Array = NDArray[np.float64]
 HORIZONS = (0.5, 1.0, 2.0)
@@ -51,7 +51,7 @@ class Clip:
     """states: for each frame. distance (F, P): of each pair in each frame (m), NaN if an object is not tracked."""
 
     name: str
-    scene: Trajectory
+    scene: RecordedTracks
     states: list[NDArray[np.void]]
     pairs: list[tuple[int, int]]
     distance: Array
@@ -67,7 +67,7 @@ class Reported:
 
 def load(prefix: Path) -> Clip:
     """Read all frames of a clip and compute the distances of all pairs."""
-    scene = Trajectory(None, None, prefix)
+    scene = RecordedTracks(None, None, prefix)
     frames = round(scene.duration * FRAME_RATE) + 1
     states = []
     for frame in range(frames):

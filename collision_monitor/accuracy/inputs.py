@@ -19,7 +19,7 @@ from collision_monitor.errors import InputError, MessageError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.session import Session
 from collision_monitor.world import check_path, make_scene
-from collision_monitor.world.trajectory import clip_paths
+from collision_monitor.world.recorded_tracks import clip_paths
 
 
 class Workload(NamedTuple):

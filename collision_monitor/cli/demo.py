@@ -96,7 +96,7 @@ def demo_command(args: argparse.Namespace) -> int:
     """
     stop = StopRequest(within=2.5 * PATIENCE, code=ExitCode.INTERRUPTED).install()  # both processes end before
     from collision_monitor.world import check_path, make_scene
-    from collision_monitor.world.trajectory import track_files
+    from collision_monitor.world.recorded_tracks import track_files
 
     with usage():
         check_path(args.scene, args.path)

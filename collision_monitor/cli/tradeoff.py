@@ -117,7 +117,7 @@ def tradeoff_command(args: argparse.Namespace) -> int:
     from collision_monitor.accuracy.tuning.front import summaries
     from collision_monitor.objects.models import parse_model
     from collision_monitor.settings.profile import Profile
-    from collision_monitor.world.trajectory import track_files
+    from collision_monitor.world.recorded_tracks import track_files
 
     if args.session is not None and args.scene:
         raise UsageError("tradeoff: expected a session or scenes, got both")

@@ -192,10 +192,3 @@ def flat_motion(motion: Motion, pose: Pose) -> Motion:
     course, rest = motion.numbers[-2:]
     set_courses(rows, False, course == ARC, rest < inf)
     return _of_numbers(pose, tuple(rows[0, LINEAR:].tolist()))
-
-
-def as_motion(value: Any, name: str) -> Motion:
-    """Return a motion. Raises PoseError for anything else; name: of the argument, for the error."""
-    if isinstance(value, Motion):
-        return value
-    raise PoseError(f"{name}: expected a Motion, got {type(value).__name__}; write Motion(pose)")

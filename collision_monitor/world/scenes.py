@@ -14,10 +14,10 @@ from collision_monitor.world.clutter import Clutter
 from collision_monitor.world.crossing import Crossing
 from collision_monitor.world.fleet import Fleet
 from collision_monitor.world.measured import Measured
+from collision_monitor.world.recorded_tracks import RecordedTracks
 from collision_monitor.world.rigid.response_choice import AS_USUAL, ResponseChoice
 from collision_monitor.world.scene import Scene
 from collision_monitor.world.swarm import Swarm
-from collision_monitor.world.trajectory import Trajectory
 
 _TRACKS: Final = "trajectory"
 
@@ -86,7 +86,7 @@ _SCENES = {
     "pile": _responding("pile", "Pile", "boxes and balls fall into a bin and come to rest on each other"),
     "pendulums": _responding("pendulums", "Pendulums", "rows of balls on rods, some of them pulled aside"),
     _TRACKS: _RegisteredScene(
-        lambda objects, seed, rate, path: Trajectory(objects, rate, path),
+        lambda objects, seed, rate, path: RecordedTracks(objects, rate, path),
         "plays recorded tracks of people and carts from CSV files (needs a path)",
     ),
 }

@@ -15,13 +15,13 @@ from collision_monitor.impact.mesh_pair import SURFACES
 from collision_monitor.meshes.advance.approach import time_until
 from collision_monitor.motion.motion import MOTION, half_acceleration, most_turning, relative_velocity
 from collision_monitor.motion.stated_motion import Motion
-from collision_monitor.query.contact.contact import check_kinds, plant_bodies
+from collision_monitor.motion.trajectory import Trajectory
 from collision_monitor.query.contact.contact_kernel import contact_row
 from collision_monitor.query.contact.open_gap import location_of
-from collision_monitor.query.impact.impact_kernel import first_impact, set_motion
+from collision_monitor.query.impact.impact_kernel import set_motion
 from collision_monitor.query.impact.impact_query import ITERATIONS, MotionQuery, check_query
-from collision_monitor.query.impact.moving_body import MovingBody, check_bounded, moving_body
-from collision_monitor.query.impact.time_of_impact import time_of_impact
+from collision_monitor.query.impact.moving_body import MovingBody
+from collision_monitor.query.impact.planned_impact import PlannedPair, next_planned_impact, planned_pair
 from collision_monitor.shapes.compound import Compound
 from collision_monitor.shapes.pose import Pose
 
@@ -48,21 +48,21 @@ class ContactInterval:
 
 def impacts(
     shape_a: Compound,
-    motion_a: Motion,
+    motion_a: Motion | Trajectory,
     shape_b: Compound,
-    motion_b: Motion,
+    motion_b: Motion | Trajectory,
     horizon: float = 2.0,
-    tolerance: float = 1e-6,
+    tolerance: float = 1e-7,
     separation: float = 0.0,
     iterations: int = ITERATIONS,
     most: int = 100,
 ) -> list[ContactInterval]:
     """All intervals within [0, horizon] (s) in which two shapes are within `separation` (m) of each other.
 
-    The entries are those of `time_of_impact`, from the exit before on. On the way to an exit, an overlap of a depth
-    lasts for as long as no point can move by that depth (conservative advancement, Mirtich 1996, from inside). A gap
-    that is found to be less than two tolerances (m) ends no contact. most: intervals; the rest is left out. Raises as
-    `time_of_impact` does.
+    The entries are those of `time_of_impact` with this tolerance, from the exit before on. On the way to an exit, an
+    overlap of a depth lasts for as long as no point can move by that depth (conservative advancement, Mirtich 1996,
+    from inside). A gap that is found to be less than two tolerances (m) ends no contact. most: intervals; the rest is
+    left out. From where a Trajectory is unknown on, there is an interval without an end. Raises as `time_of_impact`.
 
     >>> import collision_monitor as cm
     >>> still, swings = cm.Motion(cm.Pose((1, 0, 0))), cm.Motion(cm.Pose(), angular=(0, 0, 3.2))
@@ -71,28 +71,46 @@ def impacts(
     [(0.0, 0.047), (0.935, 1.029), (1.916, 2.0)]
     """
     query, most = check_query(horizon, tolerance, separation, iterations), checked_whole(most, "most")
-    first = time_of_impact(shape_a, motion_a, shape_b, motion_b, *query)
-    a, b = moving_body(shape_a, motion_a, "A"), moving_body(shape_b, motion_b, "B")
-    check_bounded(a.body, b.body)
-    check_kinds(a.body, a.motion.pose, b.body, b.motion.pose)
-    plant_bodies(a.body, b.body)
+    pair = planned_pair((shape_a, motion_a), (shape_b, motion_b), query.horizon)
+    until = float(pair.pieces.borders[-1])
     found: list[ContactInterval] = []
-    entry = first.lower, first.upper
+    entry = next_planned_impact(pair, query, 0.0)
     while entry[0] < inf and len(found) < most:
         if entry[1] == inf:
             found.append(ContactInterval(entry, (entry[0], inf)))
             break
-        out = _exit(a, b, entry[1], query)
+        out = _exit(pair, entry[1], query)
         found.append(ContactInterval(entry, out))
-        if not out[1] < query.horizon:
+        if not out[1] < until:
             break
-        lower, upper, _ = first_impact(a.body.slots.first, a.motion, b.body.slots.first, b.motion, query, out[1])
-        entry = lower, upper
+        entry = next_planned_impact(pair, query, out[1])
+    if until < query.horizon and len(found) < most and not (found and found[-1].exit[1] == inf):
+        found.append(ContactInterval((until, inf), (until, inf)))
     return found
 
 
-def _exit(a: MovingBody, b: MovingBody, begin: float, query: MotionQuery) -> tuple[float, float]:
+def _exit(pair: PlannedPair, begin: float, query: MotionQuery) -> tuple[float, float]:
     """Until when the contact lasts that there is at `begin` (s), and a time without it; see ContactInterval."""
+    borders, lasts = pair.pieces.borders, begin
+    for k in range(pair.piece(begin), len(borders) - 1):
+        start = float(borders[k])
+        within = query._replace(horizon=float(borders[k + 1]) - start)
+        stays, apart = _exit_within(pair.moving(k), max(begin - start, 0.0), within, float(pair.pieces.tubes[k].sum()))
+        lasts = max(lasts, start + stays)
+        if apart < inf:
+            return lasts, start + apart
+    return lasts, inf
+
+
+def _exit_within(
+    pair: tuple[MovingBody, MovingBody], begin: float, query: MotionQuery, tube: float
+) -> tuple[float, float]:
+    """`_exit` within one piece of both motions, from `begin` on; the horizon is its end.
+
+    tube (m): how far the bodies may be off it. The first time is -inf where no contact is certain in the piece.
+    """
+    a, b = pair
+    lasts = -inf
     t, horizon, numbers = begin, query.horizon, np.array([[*m.pose.numbers, *m.numbers] for m in (a.motion, b.motion)])
     # a half-space, of infinite radius, does not turn
     arms = np.array([each.body.radius if each.body.radius < inf else 0.0 for each in (a, b)])
@@ -101,22 +119,23 @@ def _exit(a: MovingBody, b: MovingBody, begin: float, query: MotionQuery) -> tup
     for _ in range(STEPS):
         now = a.motion.at(t + later), b.motion.at(t + later)
         gap, bound, _ = contact_row(slots[0], now[0], slots[1], now[1], SURFACES)
-        gap -= query.separation
+        gap, bound = gap - query.separation, bound + tube
         if gap - bound > 2.0 * query.tolerance and not _is_inside(a, b, now):
-            return t, t + later
+            return lasts, t + later
         _stay(memory, numbers, t + later, horizon, arms, -(gap + bound), stay)
         speed, step = stay.tolist()
         if gap + bound < -0.5 * query.tolerance and step > 0.0:
-            t, later = t + later + step, 0.0
+            lasts, later = min(t + later + step, horizon), 0.0
+            t = lasts
             if not t < horizon:
-                return horizon, inf
+                break
             continue
         # as good as apart: look ahead by the time in which they move by the tolerance, then by more and more
         shortest = query.tolerance / speed if speed > 0.0 else horizon
         later = max(2.0 * later, 4.0 * shortest)
         if not t + later < horizon:
-            return t, inf
-    return t, inf
+            break
+    return lasts, inf
 
 
 def _is_inside(a: MovingBody, b: MovingBody, now: tuple[Pose, Pose]) -> bool:

@@ -6,6 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
+import numpy as np
+
+from collision_monitor.motion.trajectory import Trajectory
 from collision_monitor.query.contact.contact import Contact, contact
 from collision_monitor.records import Method
 from collision_monitor.shapes.registry import Sphere
@@ -37,6 +40,19 @@ class Impact:
         if self.status == "clear":
             return "Impact(clear)"
         return f"Impact({self.status} in {self.lower:.6g} to {self.upper:.6g} s)"
+
+    @property
+    def segment(self) -> tuple[int | None, int | None]:
+        """Where A and B are on their plans at lower: the index of the last point before; None without a Trajectory.
+
+        -1: before the first point. A clear impact has no such place.
+        """
+        given = vars(self).get("_arguments", ())[1::2]
+        places = [
+            int(np.searchsorted(each.times, self.lower, side="right")) - 1 if isinstance(each, Trajectory) else None
+            for each in given
+        ]
+        return (places[0], places[1]) if places else (None, None)
 
     def __getattr__(self, name: str) -> Any:
         """Compute the contact when it is first read: it takes as long as the search for the time."""

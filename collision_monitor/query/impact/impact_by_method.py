@@ -10,6 +10,7 @@ import numpy as np
 
 from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.motion.stated_motion import Motion
+from collision_monitor.motion.trajectory import Trajectory
 from collision_monitor.query.contact.contact import contact
 from collision_monitor.query.impact.impact import Impact
 from collision_monitor.query.impact.impact_methods import METHODS, bisection, end_of_step, swept_bounds
@@ -36,9 +37,9 @@ NUMBERS: Final = {
 
 def impact_by_method(
     shape_a: Compound,
-    motion_a: Motion,
+    motion_a: Motion | Trajectory,
     shape_b: Compound,
-    motion_b: Motion,
+    motion_b: Motion | Trajectory,
     query: MotionQuery,
     method: str,
     step: float,

@@ -33,6 +33,7 @@ from collision_monitor.meshes.distance.nearest import PLACE_A, PLACE_B
 from collision_monitor.motion.bodies import Parts, chain_radius, next_pair
 from collision_monitor.motion.motion import MOTION, quaternion_to_matrix
 from collision_monitor.motion.stated_motion import COURSE, REST, Motion
+from collision_monitor.motion.trajectory import Pieces
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.query.impact.impact_query import MotionQuery
 from collision_monitor.query.kernel_arguments import set_rotation, tables_of
@@ -87,7 +88,8 @@ def _first_impact(table: Any, parts: Any, chains: Any, window: Any, search: Any,
     spin_b = _set_chain(table, parts, chains[1], B, window.end)
     if window.begin == 0.0:
         p = B.x - A.x, B.y - A.y, B.z - A.z
-        reach, wanted = A.radius + B.radius + search.margin, search.margin - _round_off(A, B)
+        reach = A.radius + B.radius + search.margin
+        wanted = search.margin - max(_round_off(A, B), A.tube_0 + B.tube_0)
         if p[0] * p[0] + p[1] * p[1] + p[2] * p[2] <= reach * reach:
             pose = PairPose(A.rotation, B.rotation, p)
             start, _ = chains_contact(table, parts, chains[0], chains[1], pose, wanted, SURFACES, scratch, row)
@@ -172,6 +174,29 @@ def impacts_of_chains(
 
 
 @kernel
+def impact_of_pieces(
+    table: ShapeTable, parts: Parts, scratch: Scratch, moving: Any, chains: Any, pieces: Any, first: int, query: Any
+) -> tuple[int, float, float, int]:
+    """The first of the Pieces, from `first` on, within which two chains meet, with lower, upper (s) and code.
+
+    Times are from its begin on; the piece is that after the last if they never meet. query (4,): as above.
+    """
+    borders, numbers_a, numbers_b, tubes = pieces
+    search, motion = ImpactQuery(query[2], query[1], int(query[3])), moving[0]
+    found, k = (inf, inf, DECIDED), first
+    while k < len(numbers_a):
+        set_motion(motion[0], numbers_a, k)
+        set_motion(motion[1], numbers_b, k)
+        motion[0].tube_0, motion[1].tube_0 = tubes[k, 0], tubes[k, 1]
+        found = _first_impact(table, parts, chains, Window(0.0, borders[k + 1] - borders[k]), search, scratch, moving)
+        if found[0] < inf:
+            break
+        k += 1
+    motion[0].tube_0 = motion[1].tube_0 = 0.0
+    return k, found[0], found[1], found[2]
+
+
+@kernel
 def touching_chains(
     table: ShapeTable, parts: Parts, scratch: Scratch, motion: Any, chains: Any, numbers: Any, slots: Any, query: Any
 ) -> tuple[float, float]:
@@ -245,6 +270,14 @@ def first_impact(
         b, *motion_b.pose.numbers, *motion_b.numbers, *query, begin,
     )  # fmt: skip
     return found
+
+
+def first_impact_of_pieces(
+    chains: tuple[int, int], pieces: Pieces, first: int, query: MotionQuery
+) -> tuple[int, float, float, int]:
+    """Index of the first piece, from `first` on, within which two chains of the library meet; lower, upper and code."""
+    of_library, of_thread, numbers = LIBRARY.tuples, (MEMORY.scratch, MEMORY.moving), np.array(query, np.float64)
+    return impact_of_pieces(*of_library, *of_thread, _chains(chains), tuple(pieces), first, numbers)
 
 
 def first_impact_of_touching(

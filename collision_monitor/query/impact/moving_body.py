@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import TooCostlyError, UnsupportedError
-from collision_monitor.motion.stated_motion import Motion, as_motion, flat_motion
+from collision_monitor.motion.stated_motion import Motion, flat_motion
+from collision_monitor.motion.trajectory import Trajectory, as_motion
 from collision_monitor.objects.models import containing_model
 from collision_monitor.query.body import PosedShapes, QueryBody, check_in_plane, exact_body
 from collision_monitor.query.points.near_points import near_points
@@ -41,16 +42,24 @@ class MovingBody(NamedTuple):
 def moving_body(shape: Compound, motion: Any, name: str) -> MovingBody:
     """Check one of the two. Motion out of the plane of plane shapes is ignored.
 
-    Raises ShapeError, PoseError; UnsupportedError for a rotating HalfSpace.
+    Raises ShapeError, PoseError; UnsupportedError for a rotating HalfSpace, and for a Trajectory, see `planned_body`.
     """
+    body, found = planned_body(shape, motion, name)
+    if isinstance(found, Trajectory):
+        raise UnsupportedError(f"motion {name}: expected a Motion, as a Trajectory needs conservative_advancement")
+    return MovingBody(body, found)
+
+
+def planned_body(shape: Compound, motion: Any, name: str) -> tuple[QueryBody, Motion | Trajectory]:
+    """Check one of the two, which may follow a trajectory. Raises as `moving_body`."""
     body = exact_body(shape, f"shape {name}")
     motion = as_motion(motion, f"motion {name}")
     if any(isinstance(s, HalfSpace) for s, _ in body.shapes) and motion.angular.any():
         raise UnsupportedError(f"shape {name}: a HalfSpace has no end and cannot turn")
     if body.is_planar:
-        motion = flat_motion(motion, flat_pose(motion.pose))
+        motion = motion.flat() if isinstance(motion, Trajectory) else flat_motion(motion, flat_pose(motion.pose))
         check_in_plane(motion.pose)
-    return MovingBody(body, motion)
+    return body, motion
 
 
 def check_bounded(a: QueryBody, b: QueryBody) -> None:

@@ -111,7 +111,7 @@ def test_only_triangles_near_a_body_on_a_terrain_are_followed_one_by_one(
     counts = []
     follow = moving_body.touching_pieces
     monkeypatch.setattr(
-        "collision_monitor.query.impact.time_of_impact.touching_pieces",
+        "collision_monitor.query.impact.impact_of_motions.touching_pieces",
         lambda *arguments: counts.append(follow(*arguments)) or counts[-1],
     )
     monkeypatch.setattr(moving_body, "MANY_FACES", 100)

@@ -103,7 +103,7 @@ def test_wrong_arguments_get_the_errors_of_the_general_search() -> None:
     cm.contact(box, pose, box, pose)
     with pytest.raises(cm.PoseError, match=r"pose B: expected a Pose, .*, got Motion"):
         cm.contact(box, pose, box, cm.Motion(pose))  # type: ignore[arg-type]
-    with pytest.raises(cm.PoseError, match="motion A: expected a Motion, got Pose"):
+    with pytest.raises(cm.PoseError, match="motion A: expected a Motion or a Trajectory, got Pose"):
         cm.time_of_impact(box, pose, box, cm.Motion(pose))  # type: ignore[arg-type]
     with pytest.raises(cm.ShapeError, match="shape A: expected a shape"):
         cm.contact(pose, pose, box, pose)  # type: ignore[arg-type]

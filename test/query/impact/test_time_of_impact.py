@@ -306,7 +306,7 @@ def test_scale_costs_nothing(scale):
         ({"iterations": 2.5}, cm.InputError, "iterations: expected a whole number from 1, got 2.5"),
         ({"horizon": "soon"}, cm.InputError, "horizon: expected a finite number, at least 0, got 'soon'"),
         ({"shape_a": FLOOR, "shape_b": FLOOR}, cm.UnsupportedError, "two HalfSpaces"),
-        ({"motion_a": Pose()}, cm.PoseError, "motion A: expected a Motion, got Pose"),
+        ({"motion_a": Pose()}, cm.PoseError, "motion A: expected a Motion or a Trajectory, got Pose"),
         ({"shape_b": 7}, cm.ShapeError, "shape B"),
         ({"shape_b": cm.Circle(1)}, cm.UnsupportedError, "meet each other only"),
         (

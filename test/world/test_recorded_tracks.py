@@ -10,7 +10,7 @@ from collision_monitor.errors import InputError
 from collision_monitor.records import StateFlag
 from collision_monitor.shapes.registry import Box, Cylinder
 from collision_monitor.world import make_scene
-from collision_monitor.world.trajectory import FRAME_RATE
+from collision_monitor.world.recorded_tracks import FRAME_RATE
 
 RECORDED = Path(__file__).parents[2].parent / "shared" / "data" / "citr"
 PEOPLE = "id,frame,label,x_est,y_est,vx_est,vy_est\n"

@@ -37,7 +37,7 @@ _PEOPLE_COLUMNS = ("x_est", "y_est", "vx_est", "vy_est")
 _CART_COLUMNS = ("x_est", "y_est", "psi_est", "vel_est")
 
 
-class Trajectory(Scene):
+class RecordedTracks(Scene):
     """Scene "trajectory": all objects are described at the start and have states only while tracked.
 
     Several clips are played one after another. Ids: people keep theirs, carts get ids above those of the people, and

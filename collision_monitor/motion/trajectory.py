@@ -1,0 +1,357 @@
+"""Trajectories: planned motions, as pieces that follow each other, each of them one of the motions of course.py.
+
+A piece goes straight, along an arc, or stands. Curves (cubic Hermite splines) are cut into straight pieces with
+constant accelerations, and the tube of a piece bounds how far the curve is from it.
+"""
+
+from __future__ import annotations
+
+from math import inf
+from typing import Any, Final, Literal, NamedTuple, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor._jit import allocating_kernel
+from collision_monitor.checks.numbers import as_numbers
+from collision_monitor.errors import PoseError
+from collision_monitor.motion.course import turned_for
+from collision_monitor.motion.motion import turn_quaternion, twist_on
+from collision_monitor.motion.stated_motion import (
+    ACCELERATION,
+    ANGULAR,
+    COURSE,
+    LINEAR,
+    NUMBERS,
+    REST,
+    Motion,
+    flat_motion,
+    motion_of,
+    set_courses,
+)
+from collision_monitor.shapes.planar import flat_pose
+from collision_monitor.shapes.pose import Frozen, Pose, as_pose, multiply
+from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
+
+Array = NDArray[np.float64]
+Between = Literal["straight", "arc", "curve"]
+Then = Literal["rest", "go on", "unknown"]
+
+MOST_POINTS: Final = 100_000
+"""Points of a trajectory: half an hour at 50 Hz. A trajectory takes 150 bytes for each piece."""
+
+FASTEST: Final = 1e5
+"""m/s, and rad/s. A plan that asks for more has a wrong time or a wrong unit."""
+
+CURVE_TOLERANCE: Final = 1e-6
+"""m: how far a curve may be from its pieces. Smaller: more pieces, by the root of the third order."""
+
+MOST_PARTS: Final = 256
+"""Pieces of a curve between two points. A curve that needs more has a wider tube."""
+
+CUBIC_ERROR: Final = 1.0 / 124.0
+"""Largest distance of a cubic from the parabola through its ends and its middle, for a third derivative of 1 in a span
+of 1: sqrt(3) / 216, rounded up."""
+
+SMALL_ANGLE: Final = 1e-4
+"""rad, below which the series of the logarithm of a rotation is exact to round-off."""
+
+
+class Trajectory(Frozen):
+    """A planned motion: poses at times, and what lies between them. Raises PoseError.
+
+    times (N,): s from now on, rising; the first may lie in the past. Before it the body rests at its first pose. poses:
+    (N, 7) x y z qx qy qz qw, or a sequence of what `as_pose` takes. twists (N, 6) or (N, 3): linear velocities (m/s,
+    world axes) at the points, which a curve needs; how fast the body turns follows from the poses.
+    between: "straight", constant velocity and angular velocity (of a polyline with slerp); "arc", constant twist in the
+    body's own frame, as a wheeled robot follows a path (Murray, Li and Sastry, 1994, 2.3); "curve", the cubic Hermite
+    spline, with a constant angular velocity between two points. The default is "curve" with twists, "straight" without.
+    then: what holds after the last point: "rest"; "go on" along the last piece; "unknown": no answer is clear beyond.
+
+    >>> path = Trajectory([0, 1, 3], [(0, 0, 0), (1, 0, 0), (1, 4, 0)])
+    >>> path.at(2.0).position
+    array([1., 2., 0.])
+    """
+
+    times: Array
+    poses: Array
+    then: Then
+    begins: Array
+    """(M,): s at which each piece begins."""
+    numbers: Array
+    """(M, NUMBERS): the motion of each piece from its begin on."""
+    tubes: Array
+    """(M,): m by which the body may be off each piece."""
+
+    def __init__(
+        self, times: Any, poses: Any, twists: Any = None, *, between: Between | None = None, then: Then = "rest"
+    ) -> None:
+        known = self.__dict__
+        if between is None:
+            between = "straight" if twists is None else "curve"
+        _check_choice(between, "between", get_args(Between))
+        _check_choice(then, "then", get_args(Then))
+        known["times"] = times = _checked_times(times)
+        known["poses"] = poses = _checked_poses(poses, len(times))
+        velocities = _checked_velocities(twists, len(times)) if twists is not None else None
+        if between == "curve" and velocities is None:
+            raise PoseError("twists: expected linear velocities at the points of a curve, got none")
+        known["then"] = then
+        spans = np.diff(times)
+        turns = _rotation_vectors(poses[:-1, 3:], poses[1:, 3:])
+        rows = _still_rows(poses[:-1])
+        rows[:, ANGULAR:ACCELERATION] = turns / spans[:, None]
+        begins, tubes = times[:-1], np.zeros(len(spans))
+        _check_speeds(np.diff(poses[:, :3], axis=0) / spans[:, None], rows[:, ANGULAR:ACCELERATION])
+        if between == "curve" and velocities is not None:
+            rows, begins, tubes = _curves(times, poses, velocities, rows)
+        elif between == "arc":
+            rows[:, LINEAR:ANGULAR] = _screws(poses, turns) / spans[:, None]
+            rows[:, ANGULAR:ACCELERATION] = _turned_back(poses[:-1, 3:], rows[:, ANGULAR:ACCELERATION])
+            set_courses(rows, True, True, False)
+        else:
+            rows[:, LINEAR:ANGULAR] = np.diff(poses[:, :3], axis=0) / spans[:, None]
+        first, last = _still_rows(poses[:1]), _still_rows(poses[-1:])
+        if then == "go on":
+            last = carried(rows[-1:], times[-1:] - begins[-1:])
+            if between == "curve" and velocities is not None:
+                last[:, LINEAR:ANGULAR], last[:, ACCELERATION:COURSE] = velocities[-1], 0.0
+        known["numbers"] = np.concatenate([first, rows, last])
+        known["begins"] = np.concatenate([[-LARGEST_INPUT], begins, times[-1:]])
+        known["tubes"] = np.concatenate([[0.0], tubes, [0.0]])
+        for name in ("times", "poses", "numbers", "begins", "tubes"):
+            known[name].setflags(write=False)
+
+    def __repr__(self) -> str:
+        """Return how many points there are, when they are, and what follows, for a person."""
+        first, last = self.times[0], self.times[-1]
+        return f"{type(self).__name__}({len(self.times)} points, {first:g} to {last:g} s, then {self.then})"
+
+    @property
+    def pose(self) -> Pose:
+        """The pose now."""
+        return self.at(0.0)
+
+    @property
+    def angular(self) -> Array:
+        """(M, 3): angular velocity of each piece (rad/s, world axes)."""
+        return self.numbers[:, ANGULAR:ACCELERATION]
+
+    def piece(self, time: Any) -> Any:
+        """Index of the piece that holds at a time or at times (s)."""
+        return np.maximum(np.searchsorted(self.begins, time, side="right") - 1, 0)
+
+    def rows(self, times: Array) -> Array:
+        """The motions (T, NUMBERS) that hold from some times (T,) on."""
+        k = self.piece(times)
+        return carried(self.numbers[k], times - self.begins[k])
+
+    def at(self, time: float) -> Pose:
+        """The pose at a time (s)."""
+        return Pose.of_numbers(self.rows(np.array([float(time)]))[0, :LINEAR].tolist())
+
+    def flat(self) -> Trajectory:
+        """The trajectory of a shape in the x-y plane, without what leads out of it. Raises PoseError."""
+        made = object.__new__(Trajectory)
+        numbers = np.empty_like(self.numbers)
+        for k, row in enumerate(self.numbers):
+            pose = Pose.of_numbers(row[:LINEAR].tolist())
+            flat = flat_motion(motion_of(pose, row), flat_pose(pose))
+            numbers[k] = (*flat.pose.numbers, *flat.numbers)
+        made.__dict__.update(self.__dict__, numbers=numbers)
+        return made
+
+
+def _check_choice(value: Any, name: str, choices: tuple[str, ...]) -> None:
+    if value not in choices:
+        raise PoseError(f"{name}: expected one of {', '.join(map(repr, choices))}, got {value!r:.100}")
+
+
+def _checked_times(times: Any) -> Array:
+    array = np.array(as_numbers(times, "times", "numbers (N,)", PoseError))
+    if array.ndim != 1 or not 2 <= len(array) <= MOST_POINTS:
+        raise PoseError(f"times: expected 2 to {MOST_POINTS} numbers (N,), got shape {array.shape}")
+    if not (np.abs(array) <= LARGEST_INPUT).all():
+        raise PoseError(f"times: expected finite numbers up to {LARGEST_INPUT:g}, got {array[~np.isfinite(array)][:1]}")
+    late = np.flatnonzero(~(np.diff(array) > 0.0))
+    if len(late):
+        k = int(late[0])
+        raise PoseError(f"times: expected rising ones, got {array[k]:g} and then {array[k + 1]:g} at point {k + 1}")
+    return array
+
+
+def _checked_poses(poses: Any, count: int) -> Array:
+    if isinstance(poses, np.ndarray) and poses.ndim == 2:
+        rows = np.array(as_numbers(poses, "poses", "numbers (N, 7)", PoseError))
+    elif isinstance(poses, list | tuple | np.ndarray):
+        rows = np.array([as_pose(each, f"poses, point {k}").numbers for k, each in enumerate(poses)]).reshape(-1, 7)
+    else:
+        raise PoseError(f"poses: expected an array (N, 7) or a sequence of poses, got {type(poses).__name__}")
+    if rows.shape == (count, 3):
+        rows = np.concatenate([rows, np.tile((0.0, 0.0, 0.0, 1.0), (count, 1))], axis=1)
+    if rows.shape != (count, 7):
+        raise PoseError(f"poses: expected shape ({count}, 7), one for each time, got {rows.shape}")
+    bad = np.flatnonzero(~(np.abs(rows) <= LARGEST_INPUT).all(axis=1))
+    norms = np.linalg.norm(rows[:, 3:], axis=1)
+    if len(bad):
+        raise PoseError(f"poses: expected finite numbers up to {LARGEST_INPUT:g}, got others at point {bad[0]}")
+    bad = np.flatnonzero(np.abs(norms - 1.0) > UNIT_QUATERNION)
+    if len(bad):
+        k = int(bad[0])
+        raise PoseError(
+            f"poses: expected quaternions of unit length within {UNIT_QUATERNION:g}, got {norms[k]:g} at point {k}"
+        )
+    rows[:, 3:] /= norms[:, None]
+    return rows
+
+
+def _checked_velocities(twists: Any, count: int) -> Array:
+    """Linear velocities (N, 3) of twists."""
+    rows = np.array(as_numbers(twists, "twists", "numbers (N, 6)", PoseError))
+    if rows.shape not in ((count, 6), (count, 3)):
+        raise PoseError(f"twists: expected shape ({count}, 6) or ({count}, 3), one for each time, got {rows.shape}")
+    bad = np.flatnonzero(~(np.abs(rows) <= FASTEST).all(axis=1))
+    if len(bad):
+        k = int(bad[0])
+        raise PoseError(f"twists: expected finite numbers up to {FASTEST:g}, got {rows[k].tolist()} at point {k}")
+    return np.ascontiguousarray(rows[:, :3])
+
+
+def _check_speeds(linear: Array, angular: Array) -> None:
+    for speeds, unit in ((linear, "m/s"), (angular, "rad/s")):
+        size = np.linalg.norm(speeds, axis=1)
+        bad = np.flatnonzero(~(size <= FASTEST))
+        if len(bad):
+            k = int(bad[0])
+            raise PoseError(
+                f"poses: expected at most {FASTEST:g} {unit} between two points, got {size[k]:g} from point {k} on; "
+                "check the unit of the times"
+            )
+
+
+def _still_rows(poses: Array) -> Array:
+    """Numbers (N, NUMBERS) of bodies that stand at poses (N, 7)."""
+    rows = np.zeros((len(poses), NUMBERS))
+    rows[:, :LINEAR], rows[:, REST] = poses, np.inf
+    return rows
+
+
+def _rotation_vectors(before: Array, after: Array) -> Array:
+    """Rotation vectors (N, 3) of the shortest rotations from quaternions (N, 4) to others, in world axes (rad)."""
+    turn = multiply(after, before * (-1.0, -1.0, -1.0, 1.0))
+    turn *= np.where(turn[:, 3:] < 0.0, -1.0, 1.0)
+    sine = np.linalg.norm(turn[:, :3], axis=1)
+    angle = 2.0 * np.arctan2(sine, turn[:, 3])
+    return turn[:, :3] * np.where(sine > 0.0, angle / np.where(sine > 0.0, sine, 1.0), 2.0)[:, None]
+
+
+def _turned_back(quaternions: Array, vectors: Array) -> Array:
+    """Vectors (N, 3) of the world along the axes of bodies with quaternions (N, 4)."""
+    back = quaternions * (-1.0, -1.0, -1.0, 1.0)
+    return multiply(multiply(back, np.pad(vectors, ((0, 0), (0, 1)))), quaternions)[:, :3]
+
+
+def _screws(poses: Array, turns: Array) -> Array:
+    """Shifts (N - 1, 3), along the first body's axes, of the constant twists that take each pose to the next in 1 s.
+
+    turns: rotation vectors. (Murray, Li and Sastry, 1994, 2.3: logarithm of a rigid motion)
+    """
+    w = _turned_back(poses[:-1, 3:], turns)
+    p = _turned_back(poses[:-1, 3:], np.diff(poses[:, :3], axis=0))
+    angle = np.linalg.norm(w, axis=1)
+    is_small = angle < SMALL_ANGLE
+    safe = np.where(is_small, 1.0, angle)
+    half = 0.5 * safe
+    tail = np.where(is_small, 1.0 / 12.0, (1.0 - half * np.cos(half) / np.sin(half)) / (safe * safe))
+    across = np.cross(w, p)
+    return p - 0.5 * across + tail[:, None] * np.cross(w, across)
+
+
+def _curves(times: Array, poses: Array, velocities: Array, rows: Array) -> tuple[Array, Array, Array]:
+    """Pieces of the cubic Hermite spline through points with velocities (N, 3): numbers, begins and tubes.
+
+    rows: those between the points, with their angular velocities.
+    """
+    h = np.diff(times)[:, None]
+    p, v, v_end = poses[:-1, :3], velocities[:-1], velocities[1:]
+    secant = np.diff(poses[:, :3], axis=0) / h
+    a = (6.0 * secant - 4.0 * v - 2.0 * v_end) / h
+    j = 6.0 * (v + v_end - 2.0 * secant) / (h * h)
+    off = np.linalg.norm(j, axis=1) * h[:, 0] ** 3 * CUBIC_ERROR
+    parts = np.clip(np.ceil(np.cbrt(off / CURVE_TOLERANCE)), 1, MOST_PARTS).astype(int)
+    k = np.repeat(np.arange(len(parts)), parts)
+    nth = np.arange(len(k)) - np.repeat(np.cumsum(parts) - parts, parts)
+    span = (h[:, 0] / parts)[k][:, None]
+    s = nth[:, None] * span
+    pieces = carried(rows[k], s[:, 0])
+    position = p[k] + (v[k] + (a[k] / 2.0 + j[k] * s / 6.0) * s) * s
+    velocity, acceleration = v[k] + (a[k] + j[k] * s / 2.0) * s, a[k] + j[k] * s
+    # the parabola through both ends and the middle of j s^3 / 6 is j (3 h s^2 / 2 - h^2 s / 2) / 6
+    pieces[:, :3] = position
+    pieces[:, LINEAR:ANGULAR] = velocity - j[k] * span * span / 12.0
+    pieces[:, ACCELERATION:COURSE] = acceleration + j[k] * span / 2.0
+    return pieces, times[k] + s[:, 0], (off / parts**3)[k]
+
+
+def carried(numbers: Array, ages: Array) -> Array:
+    """Motions (N, NUMBERS) as they go on from some times (N,) after their beginnings (s)."""
+    out = np.empty_like(numbers, order="C")
+    _carry(np.ascontiguousarray(numbers), ages, out)
+    return out
+
+
+@allocating_kernel
+def _carry(numbers: Any, ages: Any, out: Any) -> None:
+    q = np.empty(4)
+    for k in range(len(numbers)):
+        row, to, t = numbers[k], out[k], ages[k]
+        v, w, a = (row[7], row[8], row[9]), (row[10], row[11], row[12]), (row[13], row[14], row[15])
+        kind, rest = int(row[COURSE]), row[REST]
+        there = twist_on(kind, v, w, a, t, rest)
+        turn_quaternion(numbers[:, 3:7], k, w[0], w[1], w[2], turned_for(kind, v, a, t, rest), q)
+        for c in range(3):
+            to[c] = row[c] + there.moved[c]
+            to[LINEAR + c], to[ANGULAR + c] = there.velocity[c], there.angular[c]
+            to[ACCELERATION + c] = a[c] if kind == 0 else there.velocity[c] * there.change
+        for c in range(4):
+            to[3 + c] = q[c]
+        to[COURSE], to[REST] = row[COURSE], rest - t
+        if to[REST] <= 0.0:
+            to[COURSE], to[REST] = 0.0, np.inf
+
+
+def as_motion(value: Any, name: str) -> Motion | Trajectory:
+    """Return a motion or a trajectory. Raises PoseError for anything else; name: of the argument, for the error."""
+    if isinstance(value, Motion | Trajectory):
+        return value
+    raise PoseError(f"{name}: expected a Motion or a Trajectory, got {type(value).__name__}; write Motion(pose)")
+
+
+class Pieces(NamedTuple):
+    """Two motions in parts of time within which each is one piece of a trajectory."""
+
+    borders: Array  # (K + 1,): s
+    a: Array  # (K, NUMBERS): motions from the begin of each part on
+    b: Array
+    tubes: Array  # (K, 2): m
+
+
+def pieces_of(a: Motion | Trajectory, b: Motion | Trajectory, horizon: float) -> Pieces:
+    """The parts of the time from now to the horizon (s), or to where one of the motions is unknown from."""
+    end = min(horizon, known_until(a), known_until(b))
+    begins = [each.begins for each in (a, b) if isinstance(each, Trajectory)]
+    inner = np.unique(np.concatenate([[0.0], *begins]))
+    starts = inner[(inner >= 0.0) & ((inner < end) | (inner == 0.0))]
+    rows, tubes = [], np.zeros((len(starts), 2))
+    for side, each in enumerate((a, b)):
+        if isinstance(each, Trajectory):
+            rows.append(each.rows(starts))
+            tubes[:, side] = each.tubes[each.piece(starts)]
+        else:
+            rows.append(carried(np.tile((*each.pose.numbers, *each.numbers), (len(starts), 1)), starts))
+    return Pieces(np.append(starts, max(end, 0.0)), rows[0], rows[1], tubes)
+
+
+def known_until(motion: Motion | Trajectory) -> float:
+    """Time (s) from which on a motion is unknown; infinite: never."""
+    return float(motion.times[-1]) if isinstance(motion, Trajectory) and motion.then == "unknown" else inf

@@ -1,0 +1,136 @@
+"""Trajectories against SciPy's splines and rotations, the exponential of a twist, and inputs that are refused."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
+from scipy.linalg import expm, logm
+from scipy.spatial.transform import Rotation, Slerp
+
+import collision_monitor as cm
+from collision_monitor.errors import PoseError
+from collision_monitor.motion.trajectory import CURVE_TOLERANCE, MOST_POINTS
+
+Array = NDArray[np.float64]
+LINE = [(0, 0, 0), (1, 0, 0), (1, 4, 0)]
+
+
+def points(rng: np.random.Generator, count: int) -> tuple[Array, Array, Array]:
+    """Times (N,), poses (N, 7) and twists (N, 6) of a random plan."""
+    times = np.cumsum(rng.uniform(0.1, 0.5, count)) - 0.3
+    position = np.cumsum(rng.normal(0.0, 0.3, (count, 3)), axis=0)
+    quaternion = Rotation.random(count, random_state=rng).as_quat()
+    return times, np.concatenate([position, quaternion], axis=1), rng.normal(size=(count, 6))
+
+
+def matrix(row: Array) -> Array:
+    return cm.Pose(row[:3], row[3:]).matrix
+
+
+def expected(times: Array, poses: Array, twists: Array, between: str, t: float) -> Array:
+    """The pose (4, 4) at a time, by other means."""
+    t = float(np.clip(t, times[0], times[-1]))
+    k = min(int(np.searchsorted(times, t, side="right")) - 1, len(times) - 2)
+    s = (t - times[k]) / (times[k + 1] - times[k])
+    if between == "arc":
+        first, last = matrix(poses[k]), matrix(poses[k + 1])
+        return np.array(first @ expm(s * np.real(logm(np.linalg.inv(first) @ last))))
+    X = np.eye(4)
+    X[:3, :3] = Slerp(times, Rotation.from_quat(poses[:, 3:]))([t])[0].as_matrix()
+    X[:3, 3] = poses[k, :3] + s * (poses[k + 1, :3] - poses[k, :3])
+    if between == "curve":
+        X[:3, 3] = CubicHermiteSpline(times, poses[:, :3], twists[:, :3])(t)
+    return X
+
+
+@pytest.mark.parametrize("between", ["straight", "curve", "arc"])
+def test_the_pose_at_any_time_is_that_of_the_spline(between: Any) -> None:
+    rng = np.random.default_rng(7)
+    within = 1.01 * CURVE_TOLERANCE if between == "curve" else 1e-9
+    for _ in range(100):
+        times, poses, twists = points(rng, 6)
+        path = cm.Trajectory(times, poses, twists, between=between)
+        for t in rng.uniform(times[0] - 1.0, times[-1] + 1.0, 5):
+            wanted = expected(times, poses, twists, between, t)
+            assert path.at(t).position == pytest.approx(wanted[:3, 3], abs=within)
+            assert path.at(t).rotation == pytest.approx(wanted[:3, :3], abs=1e-9)
+        assert np.array([path.at(t).matrix for t in times]) == pytest.approx(
+            np.array([matrix(row) for row in poses]), abs=1e-9
+        )
+
+
+def test_a_curve_is_followed_by_more_pieces_where_it_bends_more() -> None:
+    """Each piece stays within its tube, which the largest distance reaches."""
+    for speed in (0.01, 1.0, 30.0):
+        path = cm.Trajectory([0.0, 1.0], [(0, 0, 0), (1, 0, 0)], [(0, speed, 0), (0, -speed, 0)])
+        spline = CubicHermiteSpline([0.0, 1.0], [(0, 0, 0), (1, 0, 0)], [(0, speed, 0), (0, -speed, 0)])
+        ts = np.linspace(0.0, 1.0, 20_001)[:-1]
+        off = np.linalg.norm(path.rows(ts)[:, :3] - spline(ts), axis=1)
+        tube = path.tubes[path.piece(ts)]
+        assert (off <= tube + 1e-12).all()
+        assert off.max() > 0.9 * tube.max()
+        assert tube.max() <= CURVE_TOLERANCE
+
+
+def test_what_holds_after_the_last_point() -> None:
+    assert cm.Trajectory([0, 1, 3], LINE).at(9.0).position.tolist() == [1, 4, 0]
+    assert cm.Trajectory([0, 1, 3], LINE, then="go on").at(9.0).position.tolist() == [1, 16, 0]
+    curve = cm.Trajectory([0, 1], [(0, 0, 0), (1, 0, 0)], [(0, 0, 0), (0, 2, 0)], then="go on")
+    assert curve.at(3.0).position == pytest.approx([1, 4, 0])
+    turn = cm.Pose((1, 1, 0), (0, 0, np.sin(np.pi / 4), np.cos(np.pi / 4)))
+    circle = cm.Trajectory([0, 1], [cm.Pose(), turn], between="arc", then="go on")
+    assert circle.at(4.0).position == pytest.approx([0, 0, 0], abs=1e-12)
+    assert circle.at(2.0).position == pytest.approx([0, 2, 0], abs=1e-12)
+
+
+def test_poses_in_every_form_and_a_plan_that_began_before() -> None:
+    rows = np.array([[*each, 0, 0, 0, 1] for each in LINE], float)
+    whole = cm.Trajectory([-1, 0, 2], rows)
+    for poses in (LINE, np.array(LINE, float), [cm.Pose(each) for each in LINE], list(rows)):
+        other = cm.Trajectory([-1, 0, 2], poses)
+        assert (other.numbers == whole.numbers).all()
+    assert whole.pose.position.tolist() == [1, 0, 0]
+    assert cm.Trajectory([5, 6], LINE[:2]).pose.position.tolist() == [0, 0, 0]
+    assert repr(whole) == "Trajectory(3 points, -1 to 2 s, then rest)"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named", "text"),
+    [
+        (([0, 1, 1], LINE), {}, "times: expected rising ones, got 1 and then 1 at point 2"),
+        (([0, 2, 1], LINE), {}, "got 2 and then 1"),
+        (([0], LINE[:1]), {}, "times: expected 2 to"),
+        ((np.arange(MOST_POINTS + 1), LINE), {}, "times: expected 2 to"),
+        (([0, 1, np.nan], LINE), {}, "times: expected finite numbers"),
+        (([0, 1, np.inf], LINE), {}, "times: expected finite numbers"),
+        (("later", LINE), {}, "times: expected numbers"),
+        (([0, 1], LINE), {}, r"poses: expected shape \(2, 7\), one for each time, got \(3, 7\)"),
+        (([0, 1, 2], [*LINE[:2], (0, np.nan, 0)]), {}, "poses, point 2"),
+        (([0, 1], np.array([[0, 0, 0, 0, 0, 0, 2.0]] * 2)), {}, "quaternions of unit length within 0.001, got 2 at"),
+        (([0, 1], np.full((2, 7), np.nan)), {}, "poses: expected finite numbers"),
+        (([0, 1], "there"), {}, "poses: expected an array"),
+        (([0, 1e-9, 1], LINE), {}, "expected at most 100000 m/s between two points, got 1e.09 from point 0 on"),
+        (([0, 1, 2], LINE, np.zeros((2, 6))), {}, r"twists: expected shape \(3, 6\)"),
+        (([0, 1, 2], LINE, np.full((3, 6), 1e18)), {}, "twists: expected finite numbers up to 100000"),
+        (([0, 1, 2], LINE), {"between": "curve"}, "twists: expected linear velocities"),
+        (([0, 1, 2], LINE), {"between": "quintic"}, "between: expected one of 'straight', 'arc', 'curve'"),
+        (([0, 1, 2], LINE), {"then": "explode"}, "then: expected one of 'rest', 'go on', 'unknown'"),
+    ],
+)
+def test_what_is_no_plan_is_refused(arguments: tuple[Any, ...], named: dict[str, Any], text: str) -> None:
+    with pytest.raises(PoseError, match=text):
+        cm.Trajectory(*arguments, **named)
+
+
+def test_a_pose_that_turns_faster_than_any_body_is_refused() -> None:
+    turned = cm.Pose((0, 0, 0), (0, 0, 1, 0))
+    with pytest.raises(PoseError, match="rad/s between two points"):
+        cm.Trajectory([0, 1e-6], [cm.Pose(), turned])
+    with pytest.raises(AttributeError, match="never changes"):
+        cm.Trajectory([0, 1], LINE[:2]).times = np.zeros(2)  # type: ignore[misc]
+    with pytest.raises(ValueError, match="read-only"):
+        cm.Trajectory([0, 1], LINE[:2]).poses[0, 0] = 1.0
