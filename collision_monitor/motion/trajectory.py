@@ -47,7 +47,7 @@ CURVE_TOLERANCE: Final = 1e-6
 """m: how far a curve may be from its pieces. Smaller: more pieces, by the root of the third order."""
 
 MOST_PARTS: Final = 256
-"""Pieces of a curve between two points. A curve that needs more has a wider tube."""
+"""PairPieces of a curve between two points. A curve that needs more has a wider tube."""
 
 CUBIC_ERROR: Final = 1.0 / 124.0
 """Largest distance of a cubic from the parabola through its ends and its middle, for a third derivative of 1 in a span
@@ -268,7 +268,7 @@ def _screws(poses: Array, turns: Array) -> Array:
 
 
 def _curves(times: Array, poses: Array, velocities: Array, rows: Array) -> tuple[Array, Array, Array]:
-    """Pieces of the cubic Hermite spline through points with velocities (N, 3): numbers, begins and tubes.
+    """PairPieces of the cubic Hermite spline through points with velocities (N, 3): numbers, begins and tubes.
 
     rows: those between the points, with their angular velocities.
     """
@@ -327,7 +327,7 @@ def as_motion(value: Any, name: str) -> Motion | Trajectory:
     raise PoseError(f"{name}: expected a Motion or a Trajectory, got {type(value).__name__}; write Motion(pose)")
 
 
-class Pieces(NamedTuple):
+class PairPieces(NamedTuple):
     """Two motions in parts of time within which each is one piece of a trajectory."""
 
     borders: Array  # (K + 1,): s
@@ -336,7 +336,7 @@ class Pieces(NamedTuple):
     tubes: Array  # (K, 2): m
 
 
-def pieces_of(a: Motion | Trajectory, b: Motion | Trajectory, horizon: float) -> Pieces:
+def pair_pieces(a: Motion | Trajectory, b: Motion | Trajectory, horizon: float) -> PairPieces:
     """The parts of the time from now to the horizon (s), or to where one of the motions is unknown from."""
     end = min(horizon, known_until(a), known_until(b))
     begins = [each.begins for each in (a, b) if isinstance(each, Trajectory)]
@@ -349,7 +349,7 @@ def pieces_of(a: Motion | Trajectory, b: Motion | Trajectory, horizon: float) ->
             tubes[:, side] = each.tubes[each.piece(starts)]
         else:
             rows.append(carried(np.tile((*each.pose.numbers, *each.numbers), (len(starts), 1)), starts))
-    return Pieces(np.append(starts, max(end, 0.0)), rows[0], rows[1], tubes)
+    return PairPieces(np.append(starts, max(end, 0.0)), rows[0], rows[1], tubes)
 
 
 def known_until(motion: Motion | Trajectory) -> float:

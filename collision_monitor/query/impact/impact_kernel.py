@@ -33,7 +33,7 @@ from collision_monitor.meshes.distance.nearest import PLACE_A, PLACE_B
 from collision_monitor.motion.bodies import Parts, chain_radius, next_pair
 from collision_monitor.motion.motion import MOTION, quaternion_to_matrix
 from collision_monitor.motion.stated_motion import COURSE, REST, Motion
-from collision_monitor.motion.trajectory import Pieces
+from collision_monitor.motion.trajectory import PairPieces
 from collision_monitor.narrow_phase.pair_pose import PairPose
 from collision_monitor.query.impact.impact_query import MotionQuery
 from collision_monitor.query.kernel_arguments import set_rotation, tables_of
@@ -177,7 +177,7 @@ def impacts_of_chains(
 def impact_of_pieces(
     table: ShapeTable, parts: Parts, scratch: Scratch, moving: Any, chains: Any, pieces: Any, first: int, query: Any
 ) -> tuple[int, float, float, int]:
-    """The first of the Pieces, from `first` on, within which two chains meet, with lower, upper (s) and code.
+    """The first of the PairPieces, from `first` on, within which two chains meet, with lower, upper (s) and code.
 
     Times are from its begin on; the piece is that after the last if they never meet. query (4,): as above.
     """
@@ -273,7 +273,7 @@ def first_impact(
 
 
 def first_impact_of_pieces(
-    chains: tuple[int, int], pieces: Pieces, first: int, query: MotionQuery
+    chains: tuple[int, int], pieces: PairPieces, first: int, query: MotionQuery
 ) -> tuple[int, float, float, int]:
     """Index of the first piece, from `first` on, within which two chains of the library meet; lower, upper and code."""
     of_library, of_thread, numbers = LIBRARY.tuples, (MEMORY.scratch, MEMORY.moving), np.array(query, np.float64)

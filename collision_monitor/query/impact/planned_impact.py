@@ -1,4 +1,4 @@
-"""The first impact of two bodies of which at least one follows a trajectory: piece after piece, see `Pieces`."""
+"""The first impact of two bodies of which at least one follows a trajectory: piece after piece, see `PairPieces`."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from collision_monitor.meshes.trees.shape_trees import CERTAIN
 from collision_monitor.motion.stated_motion import LINEAR, Motion, motion_of
-from collision_monitor.motion.trajectory import Pieces, Trajectory, carried, pieces_of
+from collision_monitor.motion.trajectory import PairPieces, Trajectory, carried, pair_pieces
 from collision_monitor.query.body import QueryBody
 from collision_monitor.query.contact.contact import check_kinds, plant_bodies
 from collision_monitor.query.impact.impact_kernel import TOUCHES, first_impact_of_pieces
@@ -25,7 +25,7 @@ class PlannedPair(NamedTuple):
 
     a: QueryBody
     b: QueryBody
-    pieces: Pieces
+    pieces: PairPieces
 
     def piece(self, time: float) -> int:
         """Index of the piece that holds at a time (s)."""
@@ -43,7 +43,7 @@ class PlannedPair(NamedTuple):
         borders, a, b, tubes = self.pieces
         age = np.array([begin - borders[k]])
         a, b = (np.concatenate([carried(each[k : k + 1], age), each[k + 1 :]]) for each in (a, b))
-        return self._replace(pieces=Pieces(np.append(begin, borders[k + 1 :]), a, b, tubes[k:]))
+        return self._replace(pieces=PairPieces(np.append(begin, borders[k + 1 :]), a, b, tubes[k:]))
 
     def query(self, k: int, query: MotionQuery, wider: float = 0.0) -> MotionQuery:
         """A query within piece k alone, with a separation that is wider by some of its tubes."""
@@ -61,7 +61,7 @@ def planned_pair(a: Side, b: Side, horizon: float) -> PlannedPair:
     check_bounded(body_a, body_b)
     check_kinds(body_a, motion_a.pose, body_b, motion_b.pose)
     plant_bodies(body_a, body_b)
-    return PlannedPair(body_a, body_b, pieces_of(motion_a, motion_b, horizon))
+    return PlannedPair(body_a, body_b, pair_pieces(motion_a, motion_b, horizon))
 
 
 def planned_impact(a: Side, b: Side, query: MotionQuery) -> tuple[float, float]:
