@@ -44,6 +44,7 @@ _HOME = {
     "Pose": "shapes.pose",
     "Motion": "motion.stated_motion",
     "Trajectory": "motion.trajectory",
+    "Tolerance": "motion.trajectory",
     "load_mesh": "shapes.mesh_file",
     "contact": "query.contact.contact",
     "Contact": "query.contact.contact",
@@ -106,6 +107,7 @@ if TYPE_CHECKING:
     from collision_monitor.monitor.result import StepResult as StepResult
     from collision_monitor.monitor.result import StepStatus as StepStatus
     from collision_monitor.motion.stated_motion import Motion as Motion
+    from collision_monitor.motion.trajectory import Tolerance as Tolerance
     from collision_monitor.motion.trajectory import Trajectory as Trajectory
     from collision_monitor.objects.convex_decomposition import Decomposition as Decomposition
     from collision_monitor.objects.convex_decomposition import convex_decomposition as convex_decomposition

@@ -32,8 +32,10 @@ from collision_monitor.impact.tree_impact import FULL
 from collision_monitor.meshes.distance.nearest import MEMORY, PLACE_A, PLACE_B, answer_row
 from collision_monitor.motion.bodies import next_pair
 from collision_monitor.motion.motion import (
+    MOTION,
     half_acceleration,
     position_at,
+    set_piece,
     smooth_until,
 )
 from collision_monitor.motion.placed_pair import place_pair
@@ -96,6 +98,7 @@ class Scratch(NamedTuple):
     tree: Any  # (MEMORY,), see meshes.nearest
     answer: Any  # (ANSWER,), see there
     triangle: Any  # (3, LANES), see meshes.solid
+    piece: Any  # (2,) MOTION: pieces of the plans of two bodies
 
 
 CLOSING: Final = CONTACT_SIZE
@@ -112,6 +115,7 @@ def make_scratch() -> Scratch:
         tree=np.zeros(MEMORY),
         answer=answer_row(),
         triangle=np.zeros((3, LANES)),
+        piece=np.zeros(2, MOTION),
     )
 
 
@@ -310,19 +314,49 @@ def body_impact(
 
     event.status = CLEAR if there is none. BodyPair that overlap, or are within query.margin, at the begin have their
     impact there. The reference motions and their tubes are those in `bodies`; in the record, i is the body with the
-    smaller id. Returns the number of distance queries.
+    smaller id. Bodies that follow plans are searched piece by piece. Returns the number of distance queries.
     """
     table, parts, bodies = multibody
     if bodies.id[i] > bodies.id[j]:
         i, j = j, i
-    pair = BodyPair(
-        bodies.motion[i], bodies.motion[j], bodies.first_shape[i], bodies.first_shape[j],
-        bodies.spin_radius[i], bodies.spin_radius[j],
-    )  # fmt: skip
-    queries = chains_impact(table, parts, pair, window, query, scratch, event)
+    A, B = bodies.motion[i], bodies.motion[j]
+    a, b, spin_a, spin_b = bodies.first_shape[i], bodies.first_shape[j], bodies.spin_radius[i], bodies.spin_radius[j]
+    begin, end = window
+    queries, unresolved = 0, inf
+    while True:
+        if A.until <= begin:
+            A = scratch.piece[0]
+            _set_piece_at(bodies, i, begin, A)
+        if B.until <= begin:
+            B = scratch.piece[1]
+            _set_piece_at(bodies, j, begin, B)
+        stop = min(end, A.until, B.until)
+        pair = BodyPair(A, B, a, b, spin_a, spin_b)
+        queries += chains_impact(table, parts, pair, Window(begin, stop), query, scratch, event)
+        if event.status != CLEAR:
+            unresolved = min(unresolved, event.lower)
+        if event.status == HIT or stop >= end:
+            break
+        begin = stop
+    if unresolved < inf:  # what is open in one piece may be certain in the next
+        event.lower = unresolved
+        if event.status == CLEAR:
+            event.status, event.upper = UNRESOLVED, inf
     if event.status != CLEAR:
         write_pair(bodies, i, j, event)
     return queries
+
+
+@outlined
+def _set_piece_at(bodies: Any, i: int, t: float, piece: Any) -> None:
+    """Write the piece of body i's plan that holds from time t on into `piece` (MOTION), with the body's tube."""
+    m = bodies.motion[i]
+    k = m.piece
+    while bodies.pieces[k].until <= t:
+        k += 1
+    set_piece(bodies.pieces[k], piece)
+    piece.radius, piece.cover, piece.covered = m.radius, m.cover, m.covered
+    piece.tube_0, piece.tube_1, piece.tube_time = m.tube_0, m.tube_1, m.tube_time
 
 
 @device

@@ -124,11 +124,12 @@ def coarse_impact(
 
 @inlined
 def has_bounds(multibody: Any, i: int, j: int) -> bool:
-    """Whether two bodies are one shape each, one of them a mesh or a cloud, and none of them a half-space."""
+    """Whether two bodies are one shape each, one of them a mesh or a cloud, none a half-space, none with a plan."""
     table, parts, bodies = multibody
     a, b = bodies.first_shape[i], bodies.first_shape[j]
     return (
         has_mesh(table, a, b)
+        and not (bodies.planned[i] or bodies.planned[j])
         and parts.next[a] < 0
         and parts.next[b] < 0
         and table.kind[a] != HALF_SPACE

@@ -51,20 +51,26 @@ def is_cheap(bodies: Any, i: int, j: int) -> bool:
 def bound_impact(bodies: Any, i: int, j: int, window: Window, margin: float, event: Any) -> None:
     """Write the first time in the window at which the pair's bounding spheres meet into the IMPACT record `event`.
 
-    event.status = UNRESOLVED, or CLEAR if the spheres, and therefore the bodies, do not meet.
+    event.status = UNRESOLVED, or CLEAR if the spheres, and therefore the bodies, do not meet. That of a body with a
+    plan is followed to the end of the piece that holds now, from where on the pair may meet.
     """
     begin, end = window
     if bodies.id[i] > bodies.id[j]:
         i, j = j, i
     A, B = bodies.motion[i], bodies.motion[j]
     event.status = CLEAR
+    stop = min(A.until, B.until)
+    if stop < end:  # until the next piece of a plan, which may lead anywhere
+        end = max(begin, stop)
     tube = tube_of(A, B, begin)
     approach = relative_motion_at(A, B, begin)
     bent = half_acceleration(A, B, begin, end) * (end - begin)
     reach = A.radius + B.radius + margin + tube.start
     first, last = sphere_interval(approach.p, approach.v, reach, tube.growth + bent, end - begin, 1.0)
     if first > last:
-        return
+        if end == window.end:
+            return
+        first = end - begin
     write_pair(bodies, i, j, event)
     event.shape_i, event.shape_j = bodies.first_shape[i], bodies.first_shape[j]
     event.lower, event.upper = begin + first, inf

@@ -237,7 +237,7 @@ def tighten(bodies: Any, trees: Trees, events: Any, now: float, margin: float, r
         event = events[k]
         A, B = bodies.motion[event.i], bodies.motion[event.j]
         window = Window(max(now, event.lower), min(A.cover, B.cover))
-        if window.begin < window.end:
+        if window.begin < window.end and not (bodies.planned[event.i] or bodies.planned[event.j]):
             wait = tree_meeting(bodies, trees, event.i, event.j, window, margin, rotation)
             if wait == inf:
                 event.status = CLEAR

@@ -8,17 +8,19 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from collision_monitor.checks.numbers import checked_array
 from collision_monitor.errors import InputError, Refusal
 from collision_monitor.monitor.answers import mark_overtaken, step_status
 from collision_monitor.monitor.budget import PairBudget
 from collision_monitor.monitor.crowding import leave_out_crowds
 from collision_monitor.monitor.event_list import NO_EVENTS, Events, both
-from collision_monitor.monitor.intake import Observation
+from collision_monitor.monitor.intake import Observation, checked_nanoseconds
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.monitor.stages import Stages
 from collision_monitor.monitor.state.snapshot import Snapshot, restore_stages
 from collision_monitor.monitor.state.timeline import Progress
 from collision_monitor.monitor.step_context import KernelSettings, StepContext
+from collision_monitor.motion.trajectory import Tolerance, Trajectory
 from collision_monitor.objects.chosen_model import chosen_model, model_within_error
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled
@@ -140,7 +142,56 @@ class Monitor(Stages):
         self._active_pairs.end(self._active_pairs.of_body(i))
         self._candidates.forget(np.array([i], np.int32))
         self._uncertain.forget(i)
+        self._plans.drop(self._roster, np.array([i], np.int32))
         self._roster.remove(object_id)
+
+    def follow(
+        self,
+        object_id: int,
+        plan: Trajectory | None,
+        *,
+        stamp_ns: int | None = None,
+        tolerance: Tolerance = Tolerance(),  # noqa: B008  (a tuple of numbers)
+    ) -> None:
+        """Predict an object along a plan, in place of its last state, for as long as it is within the tolerance of it.
+
+        A new plan replaces the one before; None ends it. stamp_ns: time 0 of the plan; by default the last step, or the
+        first one if there was none. A body that leaves its plan, which `StepResult.left` says, goes on as its last
+        state says, and so does one whose plan is over. Its contacts are those of its states. While it follows a plan,
+        its declared errors and bounds do not count; its tube does, which is as wide as it is off its plan.
+        Raises InputError for an unknown or static object, a plan that is over or unknown after its end, and a tolerance
+        that is no Tolerance of numbers from 0.
+        """
+        i = self._roster.slot(object_id)
+        if plan is None:
+            self._plans.drop(self._roster, np.array([i], np.int32))
+            return
+        zero = self._checked_plan(object_id, i, plan, stamp_ns)
+        numbers = checked_array(tolerance, "tolerance", least=0.0)
+        if numbers.shape != (len(Tolerance._fields),):
+            raise InputError(f"tolerance: expected a Tolerance of 4 numbers, got {tolerance!r:.100}")
+        flat = plan.flat() if self._roster.planar else plan
+        self._plans.follow(self._roster, i, flat, Tolerance(*numbers.tolist()), zero)
+
+    def _checked_plan(self, object_id: int, i: int, plan: Trajectory, stamp_ns: int | None) -> float | None:
+        """Time 0 of a plan (s after the origin); None: the first step. Raises InputError, see `follow`."""
+        name = f"object {object_id}"
+        if not isinstance(plan, Trajectory):
+            raise InputError(f"{name}: expected a Trajectory or None, got {type(plan).__name__}")
+        if self._roster.bodies.static[i]:
+            raise InputError(f"{name}: expected an object that moves, got a static one")
+        if plan.then == "unknown":
+            raise InputError(f"{name}: expected a plan that says what comes after its end, 'rest' or 'go on'")
+        stamp = None if stamp_ns is None else checked_nanoseconds(stamp_ns, "stamp_ns")
+        if not self._timeline.has_begun:
+            if stamp is not None:
+                raise InputError(f"{name}: expected a step before a plan with a stamp; or leave stamp_ns out")
+            return None
+        zero = self._timeline.now if stamp is None else self._timeline.seconds(stamp)
+        if zero + plan.times[-1] < self._timeline.now:
+            late = self._timeline.now - zero - plan.times[-1]
+            raise InputError(f"{name}: expected a plan that is not over, got one that ended {late:.3f} s ago")
+        return zero
 
     def refuse(self, reason: Refusal, text: str, count: int = 1) -> None:
         """Count refused inputs, also those that the caller refuses."""
@@ -191,6 +242,7 @@ class Monitor(Stages):
         self._intake.take(seen, timeline.seconds(seen.stamp_ns), roster, self._uncertain, p.rate_by_name, refusals)
         step = StepContext(roster, p, self._settings, timeline.now, self._answers.step_count + 1)
         budget = self._time_critical.budget(p)
+        left = self._plans.judge(step)
         new = self._predict_moved(step, bounds_only=budget is not None)  # 2 to 4
         self._examine_due(step, new, budget)  # 5 and 6
         contacts = self._answers.contacts(step, self._active_pairs)  # 7
@@ -204,12 +256,14 @@ class Monitor(Stages):
             refused=refusals.of_step,
             overtaken=overtaken,
             samples=step.samples,
+            left=tuple(sorted(roster.bodies.id[left].tolist())),
         )
         return self._answers.finish(result)
 
     def _restart(self) -> None:
         self._active_pairs.end_all()
         self._events.clear()
+        self._plans.forget(self._roster)
         self._roster.forget_states()
         self._candidates.forget(np.arange(self._roster.top, dtype=np.int32))
 
@@ -220,10 +274,14 @@ class Monitor(Stages):
         if outside is not None:
             active.end_of(outside)
         moved, ending = self._tracking.find(step, self._uncertain)
-        which = np.concatenate([moved, ending])
+        replanned, lasting = (self._tracking.inside(slots) for slots in self._plans.find(step))
+        step.work.objects_moved += len(replanned)
+        ending = np.concatenate([ending, lasting])
+        which = np.concatenate([moved, replanned, ending])
         if len(which) == 0:
             return NO_EVENTS
         self._tracking.restart(step, moved, ending, self._uncertain, candidates.grid)
+        self._plans.restart(step, replanned, candidates.grid)
         pairs = candidates.find(step, which)
         pairs = leave_out_crowds(step, pairs, active, events, candidates, self._refusals)
         self._uncertain.add_pairs(step, pairs)
@@ -268,5 +326,6 @@ class Monitor(Stages):
         """
         monitor = cls(profile, timed=False, warns=warns)
         restore_stages(monitor.stages, snapshot)
+        monitor._plans.attach(monitor._roster, monitor._timeline.now if monitor._timeline.has_begun else 0.0)
         monitor._make_room()
         return monitor

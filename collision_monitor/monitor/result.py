@@ -74,6 +74,7 @@ class StepResult:
     status are those of the last accepted step. cut: number of pairs that were examined before the budget ran out;
     None: all pairs were examined. overtaken: number of predictions that are UNRESOLVED because of the states' age.
     samples: number of samples of uncertain states that were followed for the times and probabilities of all pairs.
+    left: ids of the objects that left their plans in this step, see `Monitor.follow`.
 
     >>> import collision_monitor as cm
     >>> monitor = cm.Monitor()
@@ -92,6 +93,7 @@ class StepResult:
     refused: tuple[Refused, ...] = ()
     overtaken: int = 0
     samples: int = 0
+    left: tuple[int, ...] = ()
 
     @cached_property
     def contacts(self) -> NDArray[np.void]:
@@ -106,6 +108,7 @@ class StepResult:
     def __repr__(self) -> str:
         """Return the answers as lines for a person; refusals first."""
         lines = [f"refused: {each.text}" + f" ({each.count} of these)" * (each.count > 1) for each in self.refused]
+        lines += [f"left its plan: {object_id}" for object_id in self.left[:SHOWN]]
         lines += [
             f"contact: {c['id_a']} and {c['id_b']}, {c['signed_distance']:.4g} m ± {c['error_bound']:.1g}"
             for c in self.contacts[:SHOWN]

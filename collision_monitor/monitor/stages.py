@@ -10,6 +10,7 @@ from collision_monitor.monitor.candidates import Candidates
 from collision_monitor.monitor.event_list import EventList
 from collision_monitor.monitor.first_impacts import FirstImpacts
 from collision_monitor.monitor.intake import Intake
+from collision_monitor.monitor.plans import Plans
 from collision_monitor.monitor.refusals import Refusals
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.monitor.scene_plan import ScenePlan, scene_plan
@@ -33,6 +34,7 @@ class Stages:
         self._timeline = Timeline()
         self._refusals = Refusals(warns=warns)
         self._intake = Intake()
+        self._plans = Plans()
         self._tracking = Tracking()
         self._candidates = Candidates()
         self._first_impacts = FirstImpacts(profile.threads)
@@ -46,7 +48,8 @@ class Stages:
     def stages(self) -> tuple[Stage, ...]:
         """The stages that keep state between two steps, in the order in which they are restored."""
         return (
-            *(self._roster, self._timeline, self._refusals, self._intake, self._tracking, self._candidates),
+            *(self._roster, self._timeline, self._refusals, self._intake, self._plans, self._tracking),
+            self._candidates,
             *(self._first_impacts, self._events, self._active_pairs, self._time_critical, self._uncertain),
             self._answers,
         )
@@ -86,6 +89,11 @@ class Stages:
     def unseen_ids(self) -> list[int]:
         """Ids of the moving objects without any state, ascending."""
         return self._roster.unseen_ids()
+
+    @property
+    def following(self) -> list[int]:
+        """Ids of the objects that follow a plan, ascending; see `Monitor.follow`."""
+        return sorted(self._roster.bodies.id[self._plans.slots].tolist())
 
     @property
     def plan(self) -> ScenePlan:

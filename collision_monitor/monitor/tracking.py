@@ -100,10 +100,12 @@ class Tracking(Stage):
             renewed = np.array([i for i in roster.renewed if roster.bodies.seen[i]], np.int32)
             moved, ending = np.union1d(moved, renewed).astype(np.int32), np.setdiff1d(ending, renewed)
             roster.renewed.difference_update(renewed.tolist())
-        if len(self._outside):
-            moved, ending = moved[~self._outside[moved]], ending[~self._outside[ending]]
-        step.work.objects_moved = len(moved)
-        return moved, ending
+        step.work.objects_moved = len(moved := self.inside(moved))
+        return moved, self.inside(ending)
+
+    def inside(self, slots: Slots) -> Slots:
+        """Those of some slots whose bodies are inside the region of interest."""
+        return slots[~self._outside[slots]] if len(self._outside) else slots
 
     def _moved(self, step: StepContext, uncertain: UncertainPredictions) -> tuple[Slots, Slots]:
         """Find the slots of bodies that left their predicted motion, and of those whose prediction ends too soon."""
@@ -168,6 +170,8 @@ def find_moved(
 ) -> tuple[int, int, int]:
     """Find the bodies among the first `count` slots whose predictions no longer hold at `now`, or end too soon.
 
+    Those that follow plans are left out: see `plans.py`.
+
     The slots of the former are written into found[0], those of the latter, which end within the horizon, into found[1];
     returns both numbers, and that of all bodies that move. A prediction holds while the body's surface is within tube_0
     (m) of its reference motion and drifts from it by at most tube_1 (m/s), and while its uncertainty fits into its box.
@@ -185,7 +189,7 @@ def find_moved(
     for i in range(count):
         if i % BLOCK == 0:
             _turned_away(bodies, i, min(BLOCK, count - i), columns, angles)
-        if not bodies.used[i] or not bodies.seen[i] or bodies.static[i]:
+        if not bodies.used[i] or not bodies.seen[i] or bodies.static[i] or bodies.planned[i]:
             continue
         moving += 1
         m, horizon = bodies.motion[i], horizons[i]
@@ -336,7 +340,7 @@ def _cover_spread(
 
 
 @device
-def _cover(bodies: Any, i: int, now: float, horizon: float) -> None:
+def set_cover(bodies: Any, i: int, now: float, horizon: float) -> None:
     """Set the cover time of body i: the end of the horizon and a share of its slack.
 
     The later stages predict only what lies after `covered`. The share depends on the body's slot and the time, so that
@@ -396,7 +400,7 @@ def restart_motion(
         m.tube_time = now
         m.covered = -np.inf
         m.tube_0 = m.tube_1 = 0.0
-        _cover(bodies, i, now, horizons[i])
+        set_cover(bodies, i, now, horizons[i])
         if not bodies.static[i]:
             tube_0, tube_1 = widest_tube(bodies, i, settings)
             m.tube_0, m.tube_1 = part * tube_0, part * tube_1
@@ -424,7 +428,7 @@ def continue_motion(
         allowed = (m.spread_0 + m.spread_1 * (now - m.tube_time), m.spread_1)
         m.tube_time = now
         m.covered = m.cover
-        _cover(bodies, i, now, horizons[i])
+        set_cover(bodies, i, now, horizons[i])
         # no wider than before, because the candidates until `covered` were found with that width
         _cover_spread(bodies, uncertainty, i, now, allowed, settings.stale_acceleration)
         put_box(grid, i, swept_box(bodies, i, now, settings.margin))

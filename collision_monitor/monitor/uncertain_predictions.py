@@ -190,6 +190,7 @@ class UncertainPredictions(Stage):
         """Add pairs (P, 2) whose swept boxes overlap, found in this step. Drop the entries that no longer hold."""
         if not self.counts(step.profile):
             return
+        pairs = pairs[~step.roster.bodies.planned[pairs].any(axis=1)]
         renewed = np.empty(len(self.entries) + len(pairs), ENTRY)
         entries = renewed[: renew(self.entries, pairs, step.roster.bodies, self.spread, step.now, renewed)]
         if len(pairs):
@@ -215,13 +216,14 @@ class UncertainPredictions(Stage):
         """
         if not step.profile.horizon > 0.0:
             return predictions
-        self._widen(step, predictions, slots)
+        stated = np.flatnonzero(~step.roster.bodies.planned[slots].any(axis=1))  # plans have no errors
+        self._widen(step, predictions, slots, stated)
         if not self.counts(step.profile):
             return _sorted(predictions)
-        answers, done = self._judge_urgent(step, slots, predictions["lower"], True, pool, budget)
+        answers, done = self._judge_urgent(step, slots[stated], predictions["lower"][stated], True, pool, budget)
         for name, column in zip(ANSWERS, answers.T, strict=True):
-            predictions[name] = column
-        predictions["status"][~done] = PredictionStatus.UNRESOLVED
+            predictions[name][stated] = column
+        predictions["status"][stated[~done]] = PredictionStatus.UNRESOLVED
         self.add_pairs(step, np.empty((0, 2), np.int32))
         known = pair_keys(predictions["id_a"], predictions["id_b"])
         entries = _without(self._near(step), np.concatenate([known, touching]))
@@ -307,16 +309,16 @@ class UncertainPredictions(Stage):
         step.work.deferred += len(order) - at
         return answers, done
 
-    def _widen(self, step: StepContext, predictions: Records, slots: Pairs) -> None:
-        """Widen the intervals of the bodies that declare bounds on their accelerations."""
+    def _widen(self, step: StepContext, predictions: Records, slots: Pairs, which: NDArray[np.intp]) -> None:
+        """Widen the intervals `which` (k,) of the bodies that declare bounds on their accelerations."""
         if not self.spread.acceleration.any():
             return
-        ends = [np.ascontiguousarray(predictions[name]) for name in INTERVAL]
-        intervals, query, horizon = Intervals(slots, *ends), step.settings.impact, step.profile.horizon
+        ends = [predictions[name][which] for name in INTERVAL]
+        intervals, query, horizon = Intervals(slots[which], *ends), step.settings.impact, step.profile.horizon
         work = self._workspaces[0].exact
         widen_intervals(step.roster.multibody, self.spread, intervals, step.now, horizon, query, work)
         for name, column in zip(INTERVAL, ends, strict=True):
-            predictions[name] = column
+            predictions[name][which] = column
 
     def _sampling(self, step: StepContext, stated: bool) -> Sampling:
         p = step.profile

@@ -52,10 +52,12 @@ class BodyTable(NamedTuple):
     acceleration: Any  # (N, 3)
     course: Any  # (N,) uint8: kind of the Course from the last state on
     rest: Any  # (N,) float64: s after the last state, from which on the body stands; read if the course is not straight
+    planned: Any  # (N,) bool: the body follows a plan, and its motion is one of the pieces
+    pieces: Any  # (M,) MOTION: the pieces of the plans of all bodies, those of a plan one after the other
 
 
-DERIVED: Final = ("plain",)
-"""Columns that follow from the others and from the shapes, so that a snapshot does not hold them."""
+DERIVED: Final = ("plain", "planned", "pieces")
+"""Columns that follow from the others and from the shapes, or belong to `Plans`; the bodies' snapshot lacks them."""
 
 
 class Parts(NamedTuple):
@@ -75,7 +77,7 @@ class Multibody(NamedTuple):
 
 
 _COLUMNS: Final[dict[str, Any]] = {
-    **dict.fromkeys(("used", "static", "seen", "revolved", "concave"), np.bool_),
+    **dict.fromkeys(("used", "static", "seen", "revolved", "concave", "planned"), np.bool_),
     **dict.fromkeys(("id", "version", "group", "mask"), np.uint32),
     **dict.fromkeys(("spin_radius", "excess", "slack", "time", "rest"), np.float64),
     **dict.fromkeys(("plain", "model", "course"), np.uint8),
@@ -90,10 +92,11 @@ def make_bodies(capacity: int) -> BodyTable:
     """Make `capacity` empty slots."""
     columns = columns_in_one_block(capacity, _COLUMNS)
     state = columns.pop("state")
-    bodies = BodyTable(**columns, **{name: state[name] for name in state.dtype.names or ()})
+    fields = {name: state[name] for name in state.dtype.names or ()}
+    bodies = BodyTable(**columns, **fields, pieces=np.zeros(0, MOTION))
     bodies.first_shape[:] = -1
     bodies.motion["covered"] = -np.inf
-    bodies.rest[:] = bodies.motion["rest"] = np.inf
+    bodies.rest[:] = bodies.motion["rest"] = bodies.motion["until"] = np.inf
     return bodies
 
 

@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor._jit import device, inlined, outlined
-from collision_monitor.broad_phase.region import Region
+from collision_monitor.broad_phase.region import Region, hull_of_regions
 from collision_monitor.geometry.vector import Vector, minus, scaled
 from collision_monitor.motion.course import (
     STRAIGHT,
@@ -52,6 +52,8 @@ MOTION = np.dtype(
         ("rotation", np.float64, (3, 3)),  # at `time`
         ("course", np.int64),  # kind of its Course
         ("rest", np.float64),  # from which on the body stands; infinite: never
+        ("until", np.float64),  # to which it holds; from then on, the next piece of a plan does. Infinite: for ever
+        ("piece", np.int64),  # its index among the pieces of all plans, if it is one of a plan
     ]
 )
 """The reference motion that predictions rest on. One record per body, because a prediction reads two of them whole."""
@@ -77,6 +79,20 @@ def quaternion_to_matrix(q: Any, i: int, out: Any) -> None:
     out[2, 0] = 2.0 * (x * z - w * y)
     out[2, 1] = 2.0 * (y * z + w * x)
     out[2, 2] = 1.0 - 2.0 * (x * x + y * y)
+
+
+@outlined
+def set_piece(piece: Any, m: Any) -> None:
+    """Let the motion m (MOTION) go on as a piece of a plan does. Its radius, its tube and its cover stay."""
+    m.x, m.y, m.z = piece.x, piece.y, piece.z
+    m.vx, m.vy, m.vz = piece.vx, piece.vy, piece.vz
+    m.wx, m.wy, m.wz = piece.wx, piece.wy, piece.wz
+    m.ax, m.ay, m.az = piece.ax, piece.ay, piece.az
+    for r in range(3):
+        for c in range(3):
+            m.rotation[r, c] = piece.rotation[r, c]
+    m.time, m.course, m.rest = piece.time, piece.course, piece.rest
+    m.until, m.piece = piece.until, piece.piece
 
 
 @outlined
@@ -295,6 +311,14 @@ def swept_box(bodies: Any, i: int, begin: float, margin: float) -> Region:
     m = bodies.motion[i]
     sweep = 0.0 if bodies.static[i] else m.cover - begin
     half = m.radius + margin + m.tube_0 + m.spread_0 + (m.tube_1 + m.spread_1) * (begin - m.tube_time + sweep)
+    if m.until < begin + sweep:
+        return _swept_along_plan(bodies, m, begin, begin + sweep, half)
+    return _swept(m, begin, sweep, half)
+
+
+@inlined
+def _swept(m: Any, begin: float, sweep: float, half: float) -> Region:
+    """`swept_box` of one motion; half (m): by which it contains its origin."""
     if m.course != STRAIGHT:
         return _swept_by_pieces(m, begin, sweep, half)
     ahead = 0.5 * sweep
@@ -310,6 +334,18 @@ def swept_box(bodies: Any, i: int, begin: float, margin: float) -> Region:
         half + ahead * abs(m.vy) + bent * abs(m.ay),
         half + ahead * abs(m.vz) + bent * abs(m.az),
     )  # fmt: skip
+
+
+@outlined
+def _swept_along_plan(bodies: Any, m: Any, begin: float, end: float, half: float) -> Region:
+    """`swept_box` of a body that follows a plan, of which m is the piece that holds first: that of all its pieces."""
+    box, k = _swept(m, begin, max(m.until - begin, 0.0), half), m.piece
+    while bodies.pieces[k].until < end:
+        k += 1
+        piece = bodies.pieces[k]
+        first = max(piece.time, begin)
+        box = hull_of_regions(box, _swept(piece, first, max(min(piece.until, end) - first, 0.0), half))
+    return box
 
 
 @outlined

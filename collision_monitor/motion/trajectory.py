@@ -57,6 +57,23 @@ SMALL_ANGLE: Final = 1e-4
 """rad, below which the series of the logarithm of a rotation is exact to round-off."""
 
 
+class Tolerance(NamedTuple):
+    """How far a body may be off its plan and still follows it. All are at least 0.
+
+    >>> Tolerance(across=0.05).along
+    0.2
+    """
+
+    across: float = 0.1
+    """m, across the direction of the planned velocity; in any direction where the plan stands."""
+    along: float = 0.2
+    """m, along it."""
+    angle: float = 0.1
+    """rad."""
+    time: float = 0.2
+    """s by which it may be early or late, which adds to `along`."""
+
+
 class Trajectory(Frozen):
     """A planned motion: poses at times, and what lies between them. Raises PoseError.
 

@@ -19,6 +19,7 @@ def tables_of(
     kind: Any, size: Any, margin: Any, radius: Any, vertex_start: Any, vertex_count: Any, vertices: Any,
     vertex_index: Any, local_position: Any, local_rotation: Any, blocks: Any, next_part: Any, index: Any, placed: Any,
     rotation: Any, quaternion: Any, out: Any, work: Any, tree: Any, answer: Any, triangle: Any,
+    piece: Any,
 ) -> tuple[ShapeTable, Parts, Scratch]:  # fmt: skip
     """Group the arrays of `Library.arrays` and of a Scratch, which each of these kernels takes first."""
     table = ShapeTable(
@@ -26,7 +27,7 @@ def tables_of(
         blocks,
     )  # fmt: skip
     parts = Parts(next_part, index, placed)
-    return table, parts, Scratch(rotation, quaternion, out, work, tree, answer, triangle)
+    return table, parts, Scratch(rotation, quaternion, out, work, tree, answer, triangle, piece)
 
 
 @inlined

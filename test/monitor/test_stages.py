@@ -10,6 +10,7 @@ import pytest
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.monitor.state.snapshot import Snapshot, Stage
+from collision_monitor.motion.trajectory import Tolerance, Trajectory
 from collision_monitor.records import STATE
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import Pose
@@ -27,6 +28,7 @@ def busy() -> Monitor:
     shapes = [Sphere(0.5), Box((1, 0.6, 0.4)), [(Capsule(0.2, 1.0), Pose()), (Sphere(0.3), Pose((0.5, 0, 0)))]]
     for i in range(80):
         monitor.add(i, shapes[i % 3], name=f"body {i}", allowed=(1,) if i == 0 else (), max_linear_acceleration=i % 2)
+    monitor.follow(5, Trajectory([0, 1, 2], [(0, 0, 9), (1, 0, 9), (1, 1, 9)]), tolerance=Tolerance(99, 99, 99, 99))
     rng = np.random.default_rng(3)
     states = np.zeros(80, STATE)
     states["id"], states["quaternion"][:, 3] = np.arange(80), 1.0

@@ -24,6 +24,7 @@ from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage, che
 from collision_monitor.motion.bodies import DERIVED, BodyTable, Multibody, Parts, enlarge, make_bodies, make_parts
 from collision_monitor.motion.body_layout import lay_out_body, note_plain
 from collision_monitor.motion.course import STRAIGHT
+from collision_monitor.motion.motion import MOTION
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled, monitored_model
 from collision_monitor.records import Model, ShapeType
@@ -287,8 +288,8 @@ class Roster(Stage):
             return self._free.pop()
         if self.top == self.capacity:
             bodies = make_bodies(2 * self.top)
-            enlarge(self.bodies, bodies)
-            self.bodies = bodies
+            enlarge(self.bodies._replace(pieces=bodies.pieces), bodies)
+            self.bodies = bodies._replace(pieces=self.bodies.pieces)
         self.top += 1
         return self.top - 1
 
@@ -354,7 +355,10 @@ class Roster(Stage):
         while capacity < top:
             capacity *= 2
         saved = snapshot.columns("bodies", self.bodies, top, without=DERIVED)
-        bodies = BodyTable(**saved, plain=np.zeros(top, np.uint8))
+        bodies = BodyTable(
+            **saved, plain=np.zeros(top, np.uint8), planned=np.zeros(top, np.bool_), pieces=np.zeros(0, MOTION)
+        )
+        bodies.motion["until"], bodies.motion["piece"] = np.inf, 0  # `Plans` sets those of bodies that follow a plan
         parts = Parts(**snapshot.columns("parts", self.parts, count))
         _check_chains(bodies, parts, self._shapes.used.kind)
         self.top, self.bodies, self.parts = top, make_bodies(capacity), make_parts(len(self._shapes.table.kind))

@@ -40,9 +40,9 @@ MEMORY: Final = QueryMemory()
 def contact_of_chains(
     kind: Any, size: Any, margin: Any, radius: Any, vertex_start: Any, vertex_count: Any, vertices: Any,
     vertex_index: Any, local_position: Any, local_rotation: Any, blocks: Any, next_part: Any, index: Any, placed: Any,
-    rotation: Any, quaternion: Any, out: Any, work: Any, tree: Any, answer: Any, triangle: Any, a: int, ax: float,
-    ay: float, az: float, ai: float, aj: float, ak: float, aw: float, b: int, bx: float, by: float, bz: float,
-    bi: float, bj: float, bk: float, bw: float, limit: float, effort: int, row: Any,
+    rotation: Any, quaternion: Any, out: Any, work: Any, tree: Any, answer: Any, triangle: Any, piece: Any, a: int,
+    ax: float, ay: float, az: float, ai: float, aj: float, ak: float, aw: float, b: int, bx: float, by: float,
+    bz: float, bi: float, bj: float, bk: float, bw: float, limit: float, effort: int, row: Any,
 ) -> tuple[float, float]:  # fmt: skip
     """Write the contact of two chains of slots to a row (RESULT,); return the distance and its bound (m).
 
@@ -50,7 +50,7 @@ def contact_of_chains(
     """
     table, parts, scratch = tables_of(
         kind, size, margin, radius, vertex_start, vertex_count, vertices, vertex_index, local_position, local_rotation,
-        blocks, next_part, index, placed, rotation, quaternion, out, work, tree, answer, triangle,
+        blocks, next_part, index, placed, rotation, quaternion, out, work, tree, answer, triangle, piece,
     )  # fmt: skip
     set_rotation(scratch, ai, aj, ak, aw, rotation[0])
     set_rotation(scratch, bi, bj, bk, bw, rotation[1])
@@ -105,14 +105,14 @@ def placed_contact(
 def overlap_of_chains(
     kind: Any, size: Any, margin: Any, radius: Any, vertex_start: Any, vertex_count: Any, vertices: Any,
     vertex_index: Any, local_position: Any, local_rotation: Any, blocks: Any, next_part: Any, index: Any, placed: Any,
-    rotation: Any, quaternion: Any, out: Any, work: Any, tree: Any, answer: Any, triangle: Any, a: int, ax: float,
-    ay: float, az: float, ai: float, aj: float, ak: float, aw: float, b: int, bx: float, by: float, bz: float,
-    bi: float, bj: float, bk: float, bw: float,
+    rotation: Any, quaternion: Any, out: Any, work: Any, tree: Any, answer: Any, triangle: Any, piece: Any, a: int,
+    ax: float, ay: float, az: float, ai: float, aj: float, ak: float, aw: float, b: int, bx: float, by: float,
+    bz: float, bi: float, bj: float, bk: float, bw: float,
 ) -> bool:  # fmt: skip
     """Whether two chains of slots have a point in common. Arguments as for `contact_of_chains`."""
     table, parts, scratch = tables_of(
         kind, size, margin, radius, vertex_start, vertex_count, vertices, vertex_index, local_position, local_rotation,
-        blocks, next_part, index, placed, rotation, quaternion, out, work, tree, answer, triangle,
+        blocks, next_part, index, placed, rotation, quaternion, out, work, tree, answer, triangle, piece,
     )  # fmt: skip
     p, reach = (bx - ax, by - ay, bz - az), chain_radius(table, parts, a) + chain_radius(table, parts, b)
     if p[0] * p[0] + p[1] * p[1] + p[2] * p[2] > reach * reach * ROUND_OFF:

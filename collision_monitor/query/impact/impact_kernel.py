@@ -119,7 +119,7 @@ def set_motion(m: Any, numbers: Any, k: int) -> None:
 def impact_of_chains(
     kind: Any, size: Any, margin: Any, radius: Any, vertex_start: Any, vertex_count: Any, vertices: Any,
     vertex_index: Any, local_position: Any, local_rotation: Any, blocks: Any, next_part: Any, index: Any, placed: Any,
-    rotation: Any, quaternion: Any, out: Any, work: Any, tree: Any, answer: Any, triangle: Any, motion: Any,
+    rotation: Any, quaternion: Any, out: Any, work: Any, tree: Any, answer: Any, triangle: Any, piece: Any, motion: Any,
     event: Any, row: Any, a: int, ax: float, ay: float, az: float, ai: float, aj: float, ak: float, aw: float,
     avx: float, avy: float, avz: float, awx: float, awy: float, awz: float, aax: float, aay: float, aaz: float,
     course_a: float, rest_a: float, b: int, bx: float, by: float, bz: float, bi: float, bj: float, bk: float, bw: float,
@@ -132,7 +132,7 @@ def impact_of_chains(
     """
     table, parts, scratch = tables_of(
         kind, size, margin, radius, vertex_start, vertex_count, vertices, vertex_index, local_position, local_rotation,
-        blocks, next_part, index, placed, rotation, quaternion, out, work, tree, answer, triangle,
+        blocks, next_part, index, placed, rotation, quaternion, out, work, tree, answer, triangle, piece,
     )  # fmt: skip
     A, B = motion[0], motion[1]
     A.x, A.y, A.z, A.vx, A.vy, A.vz, A.wx, A.wy, A.wz = ax, ay, az, avx, avy, avz, awx, awy, awz

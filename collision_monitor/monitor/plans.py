@@ -1,0 +1,371 @@
+"""Plans: trajectories that bodies follow, in place of what their last states say, for as long as they stay near them.
+
+The reference motion of such a body is the piece of its plan that holds now. Its tube is as wide as the body is off its
+plan, so that a robot that follows it closely is predicted as exactly as the plan itself. A body that leaves its plan by
+more than its tolerance is predicted from its last state from then on.
+"""
+
+from __future__ import annotations
+
+from math import inf, sqrt
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from collision_monitor._jit import allocating_kernel, inlined
+from collision_monitor.broad_phase.hashed_grid import HashedGrid, put_box
+from collision_monitor.errors import InputError
+from collision_monitor.geometry.vector import dot, magnitude
+from collision_monitor.monitor.adaptive_tubes import widest_tube
+from collision_monitor.monitor.state.roster import Roster
+from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage, check_range
+from collision_monitor.monitor.step_context import StepContext
+from collision_monitor.monitor.tracking import LONGEST_SLACK, SHORTEST_SLACK, set_cover
+from collision_monitor.motion.course import ARC, STRAIGHT
+from collision_monitor.motion.motion import (
+    MOTION,
+    position_at,
+    quaternion_to_matrix,
+    rotation_at,
+    set_piece,
+    swept_box,
+    twist_at,
+)
+from collision_monitor.motion.stated_motion import COURSE, REST
+from collision_monitor.motion.trajectory import Tolerance, Trajectory
+
+PLAN: Final = np.dtype(
+    [
+        ("apart", np.float64),  # m: how far the body was off its plan at its last state
+        ("turned", np.float64),  # rad
+        ("tube", np.float64),  # m: how far the plan may be off its pieces
+        ("across", np.float64),  # of its Tolerance
+        ("along", np.float64),
+        ("angle", np.float64),
+        ("time", np.float64),
+        ("ends", np.float64),  # s after the origin: time of the last point
+        ("slot", np.int32),  # of the body
+        ("first", np.int32),  # index of its first piece
+        ("count", np.int32),  # of its pieces
+        ("fresh", np.bool_),  # it has not been predicted yet
+        ("waits", np.bool_),  # for the first step, whose stamp is its time 0
+    ]
+)
+"""A plan in force."""
+
+STANDS: Final = 1e-3
+"""m/s: slowest planned velocity that has a direction."""
+
+ROOM: Final = 1.5
+"""Width of a tube, in deviations of now. Smaller: a body whose deviation varies is predicted anew more often."""
+
+TOO_WIDE: Final = 4.0
+"""Width of a tube, in those that the body needs, from which on it is predicted anew with a narrower one."""
+
+FOLLOWS, LEFT, OVER = range(3)
+"""What becomes of a plan in a step."""
+
+MOST_PIECES: Final = 10_000_000
+"""Pieces of all plans together, 3 GB."""
+
+Slots = NDArray[np.int32]
+
+
+NOBODY: Final[Slots] = np.zeros(0, np.int32)
+
+
+class Plans(Stage):
+    """The plans in force, one of a body at most."""
+
+    SAVED = ("_rows", "_pieces")
+
+    def __init__(self) -> None:
+        self._rows: NDArray[np.void] = np.zeros(0, PLAN)
+        self._pieces: NDArray[np.void] = np.zeros(0, MOTION)
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    @property
+    def slots(self) -> Slots:
+        """Slots of the bodies that follow a plan."""
+        return np.ascontiguousarray(self._rows["slot"])
+
+    # ------------------------------------------------------------------ plans
+
+    def follow(self, roster: Roster, i: int, plan: Trajectory, tolerance: Tolerance, zero: float | None) -> None:
+        """Let body i follow a plan. zero: its time 0 (s after the origin); None: the first step.
+
+        Raises InputError if there are MOST_PIECES already.
+        """
+        self.drop(roster, np.array([i], np.int32))
+        count, start = len(plan.numbers), zero or 0.0
+        first = self._place(roster, count)
+        write_pieces(self._pieces, first, plan.numbers, plan.begins + start, plan.times[0] + start)
+        row = np.zeros(1, PLAN)
+        row["tube"], row["ends"] = plan.tubes.max(), plan.times[-1] + start
+        row["slot"], row["first"], row["count"] = i, first, count
+        row["fresh"], row["waits"] = True, zero is None
+        for name, value in tolerance._asdict().items():
+            row[name] = value
+        self._rows = np.concatenate([self._rows, row])
+        roster.bodies.planned[i] = True
+
+    def _place(self, roster: Roster, count: int) -> int:
+        """Index of the first of `count` free pieces behind all others. If there is no room, the unused ones go."""
+        rows = self._rows
+        end = int((rows["first"] + rows["count"]).max(initial=0))
+        if end + count <= len(self._pieces):
+            return end
+        needed = int(rows["count"].sum()) + count
+        if needed > MOST_PIECES:
+            raise InputError(f"trajectory: expected at most {MOST_PIECES} pieces of all plans together, got {needed}")
+        kept = np.zeros(2 * needed, MOTION)
+        end = _move(rows, self._pieces, kept, roster.bodies.motion)
+        self._pieces = kept
+        roster.bodies = roster.bodies._replace(pieces=kept)
+        return end
+
+    def drop(self, roster: Roster, slots: Slots) -> None:
+        """Let bodies go on as their last states say."""
+        gone = np.isin(self._rows["slot"], slots)
+        bodies = roster.bodies
+        for i in self._rows["slot"][gone]:
+            bodies.planned[i], bodies.motion["until"][i] = False, inf
+            roster.renewed.add(int(i))
+        self._rows = self._rows[~gone]
+
+    def forget(self, roster: Roster) -> None:
+        """Drop all plans."""
+        self.drop(roster, self.slots)
+
+    # ------------------------------------------------------------------ the step
+
+    def judge(self, step: StepContext) -> Slots:
+        """Advance each plan to the piece that holds now, drop those that end, and return the slots that left theirs."""
+        if not len(self._rows):
+            return NOBODY
+        roster = step.roster
+        if self._rows["waits"].any():
+            self._begin(step.now)
+        verdicts = np.empty(len(self._rows), np.uint8)
+        judge_plans(roster.bodies, self._rows, step.now, verdicts)
+        slots = self.slots
+        left: Slots = slots[verdicts == LEFT]
+        self.drop(roster, slots[verdicts != FOLLOWS])
+        renewed = np.isin(self._rows["slot"], list(roster.renewed))
+        self._rows["fresh"] |= renewed
+        roster.renewed.difference_update(self._rows["slot"][renewed].tolist())
+        return left
+
+    def _begin(self, now: float) -> None:
+        """Let the plans begin that wait for the first step, which is now (s)."""
+        waits = self._rows["waits"].copy()
+        for row in self._rows[waits]:
+            pieces = self._pieces[row["first"] : row["first"] + row["count"]]
+            for name in ("time", "until", "rest"):
+                pieces[name] += now
+        self._rows["ends"][waits] += now
+        self._rows["waits"] = False
+
+    def find(self, step: StepContext) -> tuple[Slots, Slots]:
+        """Slots of the bodies with plans to predict anew, and of those to predict further; see `Tracking.find`."""
+        if not len(self._rows):
+            return NOBODY, NOBODY
+        found = np.empty((2, len(self._rows)), np.int32)
+        n, m = find_moved_of_plans(step.roster.bodies, self._rows, step.now, step.horizons, step.settings.motion, found)
+        return found[0, :n], found[1, :m]
+
+    def restart(self, step: StepContext, moved: Slots, grid: HashedGrid) -> None:
+        """Make the plans of bodies their reference motions. Update their boxes in the grid."""
+        if not len(moved):
+            return
+        which = np.isin(self._rows["slot"], moved)
+        restart_plans(step.roster.bodies, self._rows[which], grid, step.now, step.horizons, step.settings.motion)
+        self._rows["fresh"][which] = False
+
+    # ------------------------------------------------------------------ snapshots
+
+    def save(self, snapshot: Snapshot, facts: Facts) -> None:
+        """See Stage. The pieces are saved one plan after the other."""
+        rows = self._rows.copy()
+        kept = np.zeros(int(rows["count"].sum()), MOTION)
+        _move(rows, self._pieces, kept, None)
+        snapshot.arrays.update({"plans.rows": rows, "plans.pieces": kept})
+
+    def restore(self, snapshot: Snapshot, facts: Facts) -> None:
+        """See Stage. `attach` lets the bodies follow them."""
+        self._rows = snapshot.array("plans.rows", np.zeros(0, PLAN))
+        self._pieces = snapshot.array("plans.pieces", np.zeros(0, MOTION))
+        rows, pieces = self._rows, self._pieces
+        check_range("plans.rows", rows["slot"], 0, len(snapshot.arrays["bodies.used"]))
+        check_range("plans.rows", rows["count"], 1, len(pieces) + 1)
+        follow_each_other = np.append(0, np.cumsum(rows["count"]))
+        check_range("plans.pieces", pieces["course"], STRAIGHT, ARC + 1)
+        used = snapshot.arrays["bodies.used"] & ~snapshot.arrays["bodies.static"]
+        if (
+            follow_each_other[-1] != len(pieces)
+            or not used[rows["slot"]].all()
+            or len(np.unique(rows["slot"])) < len(rows)
+        ):
+            raise InputError("snapshot, plans.rows: expected plans of moving bodies, one after the other, got others")
+        rows["first"], pieces["piece"] = follow_each_other[:-1], np.arange(len(pieces))
+        for first, count in zip(rows["first"], rows["count"], strict=True):
+            until = pieces["until"][first : first + count]
+            if not (np.diff(until) > 0.0).all() or until[-1] != inf:
+                raise InputError("snapshot, plans.pieces: expected pieces that follow each other for ever, got others")
+
+    def attach(self, roster: Roster, now: float) -> None:
+        """Let the restored bodies follow their restored plans from where they were, at `now` (s)."""
+        bodies = roster.bodies = roster.bodies._replace(pieces=self._pieces)
+        for row in self._rows:
+            i, first, count = int(row["slot"]), int(row["first"]), int(row["count"])
+            bodies.planned[i] = True
+            if not row["fresh"]:
+                until = self._pieces["until"][first : first + count]
+                k = first + int(np.searchsorted(until, now, side="right"))
+                bodies.motion["until"][i], bodies.motion["piece"][i] = self._pieces["until"][k], k
+
+
+def _move(rows: Any, pieces: Any, kept: Any, motion: Any) -> int:
+    """Copy the pieces of plans, one plan after the other, and change the rows; motion: of all bodies, or None.
+
+    Returns the number of pieces.
+    """
+    at = 0
+    for row in rows:
+        old, size = int(row["first"]), int(row["count"])
+        kept[at : at + size] = pieces[old : old + size]
+        kept["piece"][at : at + size] += at - old
+        if motion is not None and not row["fresh"]:
+            motion["piece"][row["slot"]] += at - old
+        row["first"], at = at, at + size
+    return at
+
+
+@allocating_kernel
+def write_pieces(pieces: Any, first: int, numbers: Any, begins: Any, starts: float) -> None:
+    """Write a plan of motions (M, NUMBERS) from some times (M,) on into pieces[first : first + M].
+
+    starts: when the second one begins; the first one stands until then.
+    """
+    last = len(numbers) - 1
+    for k in range(len(numbers)):
+        m = pieces[first + k]
+        m.x, m.y, m.z = numbers[k, 0], numbers[k, 1], numbers[k, 2]
+        m.vx, m.vy, m.vz = numbers[k, 7], numbers[k, 8], numbers[k, 9]
+        m.wx, m.wy, m.wz = numbers[k, 10], numbers[k, 11], numbers[k, 12]
+        m.ax, m.ay, m.az = numbers[k, 13], numbers[k, 14], numbers[k, 15]
+        quaternion_to_matrix(numbers[:, 3:7], k, m.rotation)
+        m.time = starts if k == 0 else begins[k]
+        m.course, m.rest = int(numbers[k, COURSE]), m.time + numbers[k, REST]
+        m.until = inf if k == last else begins[k + 1]
+        m.piece = first + k
+
+
+@inlined
+def _piece_at(bodies: Any, row: Any, t: float) -> Any:
+    """The piece of a plan that holds at time t, by bisection."""
+    low, high = row.first, row.first + row.count - 1
+    while low < high:
+        middle = (low + high) // 2
+        if bodies.pieces[middle].until <= t:
+            low = middle + 1
+        else:
+            high = middle
+    return bodies.pieces[low]
+
+
+@allocating_kernel
+def judge_plans(bodies: Any, rows: Any, now: float, verdicts: Any) -> None:
+    """Write how far the last states are off the plans to rows (P,), and FOLLOWS, LEFT or OVER to verdicts (P,).
+
+    The reference motion of each body becomes the piece that holds now. A plan is over once its last point has passed by
+    more than its tolerance.
+    """
+    own, planned = np.empty((3, 3)), np.empty((3, 3))
+    for k in range(len(rows)):
+        row = rows[k]
+        i = row.slot
+        verdicts[k] = OVER if now > row.ends + row.time else FOLLOWS
+        if not bodies.seen[i] or verdicts[k] == OVER:
+            continue
+        m = bodies.motion[i]
+        if not row.fresh and m.until <= now:
+            set_piece(_piece_at(bodies, row, now), m)
+        t = bodies.time[i]
+        piece = _piece_at(bodies, row, t)
+        x, y, z = position_at(piece, t)
+        d = (bodies.position[i, 0] - x, bodies.position[i, 1] - y, bodies.position[i, 2] - z)
+        quaternion_to_matrix(bodies.quaternion, i, own)
+        rotation_at(piece, t, planned)
+        chord = 0.0
+        for r in range(3):
+            for c in range(3):
+                chord += (own[r, c] - planned[r, c]) ** 2
+        row.apart, row.turned = magnitude(d), 2.0 * np.arcsin(min(sqrt(chord / 8.0), 1.0))
+        v = twist_at(piece, t).velocity
+        speed = magnitude(v)
+        along, most = 0.0, row.across
+        if speed > STANDS:
+            along = dot(d, v) / speed
+        else:
+            most = max(row.across, row.along)
+        across = sqrt(max(row.apart * row.apart - along * along, 0.0))
+        if across > most or abs(along) > row.along + speed * row.time or row.turned > row.angle:
+            verdicts[k] = LEFT
+
+
+@inlined
+def _deviation(bodies: Any, row: Any, age: float, stale_acceleration: float) -> float:
+    """How far (m) the surface of a body may be from its plan."""
+    r = bodies.spin_radius[row.slot]
+    off: float = row.apart + row.tube + (r * row.turned if r > 0.0 else 0.0)
+    return off + 0.5 * stale_acceleration * age * age
+
+
+@allocating_kernel
+def find_moved_of_plans(
+    bodies: Any, rows: Any, now: float, horizons: Any, settings: Any, found: Any
+) -> tuple[int, int]:
+    """`find_moved` of the bodies that follow the plans rows (P,): slots to found (2, P); returns both numbers."""
+    n = n_ending = 0
+    for k in range(len(rows)):
+        row = rows[k]
+        i = row.slot
+        if not bodies.seen[i]:
+            continue
+        m, horizon, age = bodies.motion[i], horizons[i], now - bodies.time[i]
+        apart, needed = _deviation(bodies, row, age, settings.stale_acceleration), widest_tube(bodies, i, settings)
+        drift = settings.stale_acceleration * age
+        is_off = not (apart <= m.tube_0 and drift <= m.tube_1)
+        is_wide = m.tube_0 > TOO_WIDE * max(needed[0], apart) or m.tube_1 > TOO_WIDE * max(needed[1], drift)
+        if row.fresh or is_off or is_wide:
+            if bodies.slack[i] > 0.0:  # 0: the body is new
+                bodies.slack[i] = max(0.5 * bodies.slack[i], SHORTEST_SLACK * horizon)
+            found[0, n] = i
+            n += 1
+        elif m.cover < now + horizon:
+            bodies.slack[i] = min(2.0 * bodies.slack[i], LONGEST_SLACK * horizon)
+            found[1, n_ending] = i
+            n_ending += 1
+    return n, n_ending
+
+
+@allocating_kernel
+def restart_plans(bodies: Any, rows: Any, grid: HashedGrid, now: float, horizons: Any, settings: Any) -> None:
+    """`restart_motion` of the bodies that follow the plans rows (P,): their reference motions are those plans."""
+    for k in range(len(rows)):
+        row = rows[k]
+        i = row.slot
+        m = bodies.motion[i]
+        set_piece(_piece_at(bodies, row, now), m)
+        bodies.version[i] += np.uint32(1)
+        age = now - bodies.time[i]
+        apart, needed = _deviation(bodies, row, age, settings.stale_acceleration), widest_tube(bodies, i, settings)
+        m.tube_time, m.covered = now, -inf
+        m.tube_0, m.tube_1 = max(needed[0], ROOM * apart), needed[1] + 2.0 * settings.stale_acceleration * age
+        m.spread_0 = m.spread_1 = 0.0
+        set_cover(bodies, i, now, horizons[i])
+        put_box(grid, i, swept_box(bodies, i, now, settings.margin))
