@@ -17,7 +17,7 @@ from collision_monitor._jit import allocating_kernel, inlined
 from collision_monitor.broad_phase.hashed_grid import HashedGrid, put_box
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.vector import dot, magnitude
-from collision_monitor.monitor.adaptive_tubes import widest_tube
+from collision_monitor.monitor.adaptive_tubes import NARROWEST, widest_tube
 from collision_monitor.monitor.state.roster import Roster
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage, check_range
 from collision_monitor.monitor.step_context import StepContext
@@ -39,6 +39,7 @@ PLAN: Final = np.dtype(
     [
         ("apart", np.float64),  # m: how far the body was off its plan at its last state
         ("turned", np.float64),  # rad
+        ("lately", np.float64),  # m: how far its surface was off in the last steps, see FORGOTTEN
         ("tube", np.float64),  # m: how far the plan may be off its pieces
         ("across", np.float64),  # of its Tolerance
         ("along", np.float64),
@@ -59,6 +60,9 @@ STANDS: Final = 1e-3
 
 ROOM: Final = 1.5
 """Width of a tube, in deviations of now. Smaller: a body whose deviation varies is predicted anew more often."""
+
+FORGOTTEN: Final = 0.1
+"""Part of a deviation that is forgotten in each step. Larger: narrower bounds, which a noisy body leaves more often."""
 
 TOO_WIDE: Final = 4.0
 """Width of a tube, in those that the body needs, from which on it is predicted anew with a narrower one."""
@@ -318,11 +322,19 @@ def judge_plans(bodies: Any, rows: Any, now: float, verdicts: Any) -> None:
 
 
 @inlined
-def _deviation(bodies: Any, row: Any, age: float, stale_acceleration: float) -> float:
-    """How far (m) the surface of a body may be from its plan."""
+def _deviation(bodies: Any, row: Any) -> float:
+    """How far (m) the surface of a body was from its plan at its last state."""
     r = bodies.spin_radius[row.slot]
     off: float = row.apart + row.tube + (r * row.turned if r > 0.0 else 0.0)
-    return off + 0.5 * stale_acceleration * age * age
+    return off
+
+
+@inlined
+def _narrow_tube(bodies: Any, i: int, settings: Any) -> tuple[float, float]:
+    """Deviation (m) and drift (m/s) of a body that follows its plan exactly."""
+    tube_0, tube_1 = widest_tube(bodies, i, settings)
+    part = NARROWEST if settings.adaptive else 1.0
+    return part * tube_0, part * tube_1
 
 
 @allocating_kernel
@@ -337,10 +349,12 @@ def find_moved_of_plans(
         if not bodies.seen[i]:
             continue
         m, horizon, age = bodies.motion[i], horizons[i], now - bodies.time[i]
-        apart, needed = _deviation(bodies, row, age, settings.stale_acceleration), widest_tube(bodies, i, settings)
+        off, needed = _deviation(bodies, row), _narrow_tube(bodies, i, settings)
+        row.lately = max(off, (1.0 - FORGOTTEN) * row.lately)
         drift = settings.stale_acceleration * age
+        apart = off + 0.5 * drift * age
         is_off = not (apart <= m.tube_0 and drift <= m.tube_1)
-        is_wide = m.tube_0 > TOO_WIDE * max(needed[0], apart) or m.tube_1 > TOO_WIDE * max(needed[1], drift)
+        is_wide = m.tube_0 > TOO_WIDE * max(needed[0], row.lately, apart) or m.tube_1 > TOO_WIDE * max(needed[1], drift)
         if row.fresh or is_off or is_wide:
             if bodies.slack[i] > 0.0:  # 0: the body is new
                 bodies.slack[i] = max(0.5 * bodies.slack[i], SHORTEST_SLACK * horizon)
@@ -363,9 +377,10 @@ def restart_plans(bodies: Any, rows: Any, grid: HashedGrid, now: float, horizons
         set_piece(_piece_at(bodies, row, now), m)
         bodies.version[i] += np.uint32(1)
         age = now - bodies.time[i]
-        apart, needed = _deviation(bodies, row, age, settings.stale_acceleration), widest_tube(bodies, i, settings)
+        needed = _narrow_tube(bodies, i, settings)
         m.tube_time, m.covered = now, -inf
-        m.tube_0, m.tube_1 = max(needed[0], ROOM * apart), needed[1] + 2.0 * settings.stale_acceleration * age
+        drift = 2.0 * settings.stale_acceleration * age
+        m.tube_0, m.tube_1 = max(needed[0], ROOM * row.lately) + drift * age, needed[1] + drift
         m.spread_0 = m.spread_1 = 0.0
         set_cover(bodies, i, now, horizons[i])
         put_box(grid, i, swept_box(bodies, i, now, settings.margin))
