@@ -19,6 +19,7 @@ from collision_monitor.geometry.point_tree import PointTree
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.time_critical import TimeCritical
 from collision_monitor.motion.stated_motion import Motion
+from collision_monitor.motion.trajectory import Trajectory
 from collision_monitor.objects.models import containing_model
 from collision_monitor.records import MOST_POINTS, STATE, Model
 from collision_monitor.settings.profile import NO_BUDGET, NO_LIMIT, Profile
@@ -80,7 +81,9 @@ def _step_certain(monitor: Monitor) -> tuple[Array, Array]:
         poses[:, :3] += 0.1 * twists[:, :3]
         twists[step, :] *= -1.0  # one object leaves its predicted motion
     monitor.remove(1)
+    monitor.follow(OBJECTS - 2, Trajectory([0, 1], poses[[-2, -2]], between="arc"))
     monitor.step(3_000_000_000, np.arange(2, OBJECTS), poses[2:], twists[2:])
+    monitor.follow(OBJECTS - 2, None)
     return poses[2:], twists[2:]
 
 
@@ -159,6 +162,7 @@ def warm_up_functions() -> None:
     turns = Motion(Pose((3, 0, 0)), (-1, 0, 0), (0, 0, 1), frame="body")
     impacts(box, Motion(Pose()), ball, turns)
     turns.at(1.0)
+    impacts(box, Trajectory([0, 1], [(0, 0, 0), (5, 0, 0)]), ball, turns)
     poses = np.array([[0.0, 0, 0, 0, 0, 0, 1], [1.0, 0, 0, 0, 0, 0, 1]])
     contacts(box, poses, ball, poses)
     times_of_impact(box, poses, np.zeros((2, 6)), ball, poses, np.zeros((2, 6)))

@@ -46,6 +46,8 @@ for step in range(30):
         monitor.profile = monitor.profile.replace(contact_points=4)
     if step in (20, 22, 24):
         monitor.profile = monitor.profile.replace(budget_ms=1000.0 if step == 22 else 0.2)
+    if step in (8, 12):
+        monitor.follow(9, cm.Trajectory([0, 1, 2], [poses[9], poses[8], poses[8]], between="arc"))
     if step == 10:
         monitor.remove(7)
         monitor.add(2000, cm.Sphere(1))
@@ -75,6 +77,9 @@ for kinds in ([*solids, corner, [(solids[0], still), (solids[1], aside)]], flat)
             cm.time_of_impact(a, cm.Motion(still), b, cm.Motion(moving.pose, acceleration=(-1, 0, 0)))
 for a, x in ((solids[1], 1), (corner, 2)):  # they touch
     cm.time_of_impact(a, cm.Motion(still), a, cm.Motion(cm.Pose((x, 0, 0)), (-1, 0, 0)))
+plan = cm.Trajectory([0, 1, 2], [(5, 0, 0), (0, 0, 0), (0, 5, 0)], np.eye(3))
+for a in (*solids, corner):
+    cm.impacts(a, plan, corner, cm.Motion(still))
 poses = np.zeros((9, 7)); poses[:, 6] = 1
 for a in (*solids, corner):
     cm.time_of_impact_batch(a, poses, np.ones((9, 6)), corner, poses + 5 * np.eye(1, 7), np.zeros((9, 6)))

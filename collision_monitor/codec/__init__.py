@@ -32,6 +32,12 @@ from collision_monitor.codec.parameter_event import ParameterEvent, decode_param
 from collision_monitor.codec.predictions import PredictedCollisionArray, decode_predictions, encode_predictions
 from collision_monitor.codec.states import ObjectStateArray, decode_states, encode_states
 from collision_monitor.codec.status import MonitorStatus, decode_status, encode_status
+from collision_monitor.codec.trajectories import (
+    ObjectTrajectory,
+    ObjectTrajectoryArray,
+    decode_trajectories,
+    encode_trajectories,
+)
 
 __all__ = [
     "AlertCause",
@@ -45,6 +51,8 @@ __all__ = [
     "MonitorStatus",
     "ObjectDescriptionArray",
     "ObjectStateArray",
+    "ObjectTrajectory",
+    "ObjectTrajectoryArray",
     "ParameterEvent",
     "PredictedCollisionArray",
     "Removal",
@@ -59,6 +67,7 @@ __all__ = [
     "decode_predictions",
     "decode_states",
     "decode_status",
+    "decode_trajectories",
     "encode_alert",
     "encode_alerts",
     "encode_contacts",
@@ -68,4 +77,5 @@ __all__ = [
     "encode_predictions",
     "encode_states",
     "encode_status",
+    "encode_trajectories",
 ]

@@ -122,6 +122,8 @@ class Monitor(Stages):
             raise InputError(f"describe: expected an ObjectDescription, got {description!r:.99}; or use add(id, shape)")
         model, modelled = model_within_error(description, self._profile, prepared)
         i = self._roster.describe(description, model, modelled)
+        if description.static:
+            self._plans.drop(self._roster, np.array([i], np.int32))
         self._make_room()
         self._candidates.forget(np.array([i], np.int32))  # the next step inserts its new box
         self._time_critical.describe(self._roster, i, self._profile)
@@ -171,10 +173,10 @@ class Monitor(Stages):
         if numbers.shape != (len(Tolerance._fields),):
             raise InputError(f"tolerance: expected a Tolerance of 4 numbers, got {tolerance!r:.100}")
         flat = plan.flat() if self._roster.planar else plan
-        self._plans.follow(self._roster, i, flat, Tolerance(*numbers.tolist()), zero)
+        self._plans.follow(self._roster, i, flat, Tolerance(*numbers.tolist()), zero, stamp_ns)
 
     def _checked_plan(self, object_id: int, i: int, plan: Trajectory, stamp_ns: int | None) -> float | None:
-        """Time 0 of a plan (s after the origin); None: the first step. Raises InputError, see `follow`."""
+        """Time 0 of a plan (s after the origin); None: there is no origin yet. Raises InputError, see `follow`."""
         name = f"object {object_id}"
         if not isinstance(plan, Trajectory):
             raise InputError(f"{name}: expected a Trajectory or None, got {type(plan).__name__}")
@@ -184,8 +186,6 @@ class Monitor(Stages):
             raise InputError(f"{name}: expected a plan that says what comes after its end, 'rest' or 'go on'")
         stamp = None if stamp_ns is None else checked_nanoseconds(stamp_ns, "stamp_ns")
         if not self._timeline.has_begun:
-            if stamp is not None:
-                raise InputError(f"{name}: expected a step before a plan with a stamp; or leave stamp_ns out")
             return None
         zero = self._timeline.now if stamp is None else self._timeline.seconds(stamp)
         if zero + plan.times[-1] < self._timeline.now:
@@ -242,7 +242,7 @@ class Monitor(Stages):
         self._intake.take(seen, timeline.seconds(seen.stamp_ns), roster, self._uncertain, p.rate_by_name, refusals)
         step = StepContext(roster, p, self._settings, timeline.now, self._answers.step_count + 1)
         budget = self._time_critical.budget(p)
-        left = self._plans.judge(step)
+        left = self._plans.judge(step, timeline)
         new = self._predict_moved(step, bounds_only=budget is not None)  # 2 to 4
         self._examine_due(step, new, budget)  # 5 and 6
         contacts = self._answers.contacts(step, self._active_pairs)  # 7

@@ -20,6 +20,7 @@ from collision_monitor.geometry.vector import dot, magnitude
 from collision_monitor.monitor.adaptive_tubes import NARROWEST, widest_tube
 from collision_monitor.monitor.state.roster import Roster
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage, check_range
+from collision_monitor.monitor.state.timeline import Timeline
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.monitor.tracking import LONGEST_SLACK, SHORTEST_SLACK, set_cover
 from collision_monitor.motion.course import ARC, STRAIGHT
@@ -50,7 +51,8 @@ PLAN: Final = np.dtype(
         ("first", np.int32),  # index of its first piece
         ("count", np.int32),  # of its pieces
         ("fresh", np.bool_),  # it has not been predicted yet
-        ("waits", np.bool_),  # for the first step, whose stamp is its time 0
+        ("waits", np.bool_),  # for the first step, after whose stamp all times are
+        ("stamp", np.int64),  # ns: its time 0, if it waits; NO_STAMP: the first step
     ]
 )
 """A plan in force."""
@@ -66,6 +68,8 @@ FORGOTTEN: Final = 0.1
 
 TOO_WIDE: Final = 4.0
 """Width of a tube, in those that the body needs, from which on it is predicted anew with a narrower one."""
+
+NO_STAMP: Final = -(2**63)
 
 FOLLOWS, LEFT, OVER = range(3)
 """What becomes of a plan in a step."""
@@ -98,10 +102,12 @@ class Plans(Stage):
 
     # ------------------------------------------------------------------ plans
 
-    def follow(self, roster: Roster, i: int, plan: Trajectory, tolerance: Tolerance, zero: float | None) -> None:
-        """Let body i follow a plan. zero: its time 0 (s after the origin); None: the first step.
+    def follow(
+        self, roster: Roster, i: int, plan: Trajectory, tolerance: Tolerance, zero: float | None, stamp_ns: int | None
+    ) -> None:
+        """Let body i follow a plan. zero: its time 0 (s after the origin); None: there was no step, and no origin.
 
-        Raises InputError if there are MOST_PIECES already.
+        stamp_ns: that time as a stamp; None: the first step. Raises InputError if there are MOST_PIECES already.
         """
         self.drop(roster, np.array([i], np.int32))
         count, start = len(plan.numbers), zero or 0.0
@@ -111,6 +117,7 @@ class Plans(Stage):
         row["tube"], row["ends"] = plan.tubes.max(), plan.times[-1] + start
         row["slot"], row["first"], row["count"] = i, first, count
         row["fresh"], row["waits"] = True, zero is None
+        row["stamp"] = NO_STAMP if stamp_ns is None else stamp_ns
         for name, value in tolerance._asdict().items():
             row[name] = value
         self._rows = np.concatenate([self._rows, row])
@@ -146,13 +153,13 @@ class Plans(Stage):
 
     # ------------------------------------------------------------------ the step
 
-    def judge(self, step: StepContext) -> Slots:
+    def judge(self, step: StepContext, timeline: Timeline) -> Slots:
         """Advance each plan to the piece that holds now, drop those that end, and return the slots that left theirs."""
         if not len(self._rows):
             return NOBODY
         roster = step.roster
         if self._rows["waits"].any():
-            self._begin(step.now)
+            self._begin(timeline)
         verdicts = np.empty(len(self._rows), np.uint8)
         judge_plans(roster.bodies, self._rows, step.now, verdicts)
         slots = self.slots
@@ -163,15 +170,17 @@ class Plans(Stage):
         roster.renewed.difference_update(self._rows["slot"][renewed].tolist())
         return left
 
-    def _begin(self, now: float) -> None:
-        """Let the plans begin that wait for the first step, which is now (s)."""
-        waits = self._rows["waits"].copy()
-        for row in self._rows[waits]:
+    def _begin(self, timeline: Timeline) -> None:
+        """Let the plans begin that waited for the first step."""
+        for row in self._rows:
+            if not row["waits"]:
+                continue
+            zero = timeline.now if row["stamp"] == NO_STAMP else timeline.seconds(int(row["stamp"]))
             pieces = self._pieces[row["first"] : row["first"] + row["count"]]
             for name in ("time", "until", "rest"):
-                pieces[name] += now
-        self._rows["ends"][waits] += now
-        self._rows["waits"] = False
+                pieces[name] += zero
+            row["ends"] += zero
+            row["waits"] = False
 
     def find(self, step: StepContext) -> tuple[Slots, Slots]:
         """Slots of the bodies with plans to predict anew, and of those to predict further; see `Tracking.find`."""

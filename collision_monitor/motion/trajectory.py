@@ -117,9 +117,11 @@ class Trajectory(Frozen):
         spans = np.diff(times)
         turns = _rotation_vectors(poses[:-1, 3:], poses[1:, 3:])
         rows = _still_rows(poses[:-1])
-        rows[:, ANGULAR:ACCELERATION] = turns / spans[:, None]
         begins, tubes = times[:-1], np.zeros(len(spans))
-        _check_speeds(np.diff(poses[:, :3], axis=0) / spans[:, None], rows[:, ANGULAR:ACCELERATION])
+        with np.errstate(over="ignore"):  # what overflows is too fast
+            rows[:, ANGULAR:ACCELERATION] = turns / spans[:, None]
+            secants = np.diff(poses[:, :3], axis=0) / spans[:, None]
+            _check_speeds(secants, rows[:, ANGULAR:ACCELERATION])
         if between == "curve" and velocities is not None:
             rows, begins, tubes = _curves(times, poses, velocities, rows)
         elif between == "arc":
@@ -127,7 +129,7 @@ class Trajectory(Frozen):
             rows[:, ANGULAR:ACCELERATION] = _turned_back(poses[:-1, 3:], rows[:, ANGULAR:ACCELERATION])
             set_courses(rows, True, True, False)
         else:
-            rows[:, LINEAR:ANGULAR] = np.diff(poses[:, :3], axis=0) / spans[:, None]
+            rows[:, LINEAR:ANGULAR] = secants
         first, last = _still_rows(poses[:1]), _still_rows(poses[-1:])
         if then == "go on":
             last = carried(rows[-1:], times[-1:] - begins[-1:])
@@ -209,9 +211,9 @@ def _checked_poses(poses: Any, count: int) -> Array:
     if rows.shape != (count, 7):
         raise PoseError(f"poses: expected shape ({count}, 7), one for each time, got {rows.shape}")
     bad = np.flatnonzero(~(np.abs(rows) <= LARGEST_INPUT).all(axis=1))
-    norms = np.linalg.norm(rows[:, 3:], axis=1)
     if len(bad):
         raise PoseError(f"poses: expected finite numbers up to {LARGEST_INPUT:g}, got others at point {bad[0]}")
+    norms = np.linalg.norm(rows[:, 3:], axis=1)
     bad = np.flatnonzero(np.abs(norms - 1.0) > UNIT_QUATERNION)
     if len(bad):
         k = int(bad[0])

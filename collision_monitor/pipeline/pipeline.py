@@ -32,6 +32,7 @@ from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.monitor.state.snapshot import Snapshot
 from collision_monitor.pipeline.catalogue import Catalogue
+from collision_monitor.pipeline.plan_intake import take_plans
 from collision_monitor.pipeline.preparation import Preparation
 from collision_monitor.pipeline.provenance import provenance
 from collision_monitor.pipeline.settings_event import (
@@ -174,6 +175,12 @@ class Pipeline:
         if taken:
             self._alerts.forget_classes()
         return taken, texts
+
+    # -- plans
+
+    def on_trajectories(self, data: bytes) -> None:
+        """Process an ObjectTrajectoryArray: objects follow these plans from now on. An impossible one is refused."""
+        take_plans(self.monitor, self.frame_id, data)
 
     # -- settings
 

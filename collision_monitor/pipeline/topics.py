@@ -24,6 +24,7 @@ LATCHED: Final = "transient_local"
 
 
 _OBJECTS: Final = "collision_monitor_msgs/msg/ObjectDescriptionArray"
+_PLANS: Final = "collision_monitor_msgs/msg/ObjectTrajectoryArray"
 _OBJECT_STATES: Final = "collision_monitor_msgs/msg/ObjectStateArray"
 
 
@@ -43,6 +44,9 @@ class Topic(Enum):
 
     STATES = "objects/states", _OBJECT_STATES, Quality(10, "best_effort")
     """Sensor data: a newer state makes an old one worthless. The depth covers one slow step at 1 kHz."""
+
+    TRAJECTORIES = "objects/trajectories", _PLANS, Quality(100, durability=LATCHED)
+    """Plans of objects. A monitor that starts after the planner still receives them."""
 
     SETTINGS = "settings", "rcl_interfaces/msg/ParameterEvent", Quality(1000)
     """Only recorded; live, ROS has /parameter_events."""
@@ -93,6 +97,6 @@ class Topic(Enum):
 
 RECORDED: Final = (
     *(Topic.SHAPES, Topic.STATES, Topic.SETTINGS, Topic.CONTACTS, Topic.PREDICTIONS, Topic.STATUS, Topic.ALERTS),
-    Topic.SOURCES,
+    *(Topic.SOURCES, Topic.TRAJECTORIES),
 )
 """The topics that the node records, in the order of a session's channels."""

@@ -16,7 +16,14 @@ from mcap.opcode import Opcode
 from mcap.records import Attachment, Channel, Header, Metadata, Schema
 
 from collision_monitor.alerts.rules import Rules
-from collision_monitor.codec import ObjectDescriptionArray, ObjectStateArray, decode_descriptions, decode_states
+from collision_monitor.codec import (
+    ObjectDescriptionArray,
+    ObjectStateArray,
+    ObjectTrajectoryArray,
+    decode_descriptions,
+    decode_states,
+    decode_trajectories,
+)
 from collision_monitor.errors import InputError, MessageError, ProfileError, SessionError
 from collision_monitor.pipeline.settings_event import RULES
 from collision_monitor.session.mcap.layout import (
@@ -37,8 +44,9 @@ from collision_monitor.settings.regular_file import FOLDER, found_instead
 from collision_monitor.settings.yaml_file import read_yaml
 
 _SHORT_NAMES: Final = {full_name(name): name for name in RECORDED_TYPES}
-_INPUT_DECODERS: Final[dict[str, Callable[[bytes], ObjectStateArray | ObjectDescriptionArray]]] = dict(
-    zip(INPUT_TYPES, (decode_states, decode_descriptions), strict=True)
+_Inputs = ObjectStateArray | ObjectDescriptionArray | ObjectTrajectoryArray
+_INPUT_DECODERS: Final[dict[str, Callable[[bytes], _Inputs]]] = dict(
+    zip(INPUT_TYPES, (decode_states, decode_descriptions, decode_trajectories), strict=True)
 )
 _SNAPSHOT: Final = re.compile(re.escape(SNAPSHOT) + r"(\d{1,10})\.npz")
 

@@ -27,7 +27,7 @@ from collision_monitor.sources.ground.unmonitored import Unmonitored, Unmonitore
 from collision_monitor.sources.kinds import BY_TYPE
 from collision_monitor.sources.messages.tf_objects import TRANSFORMS
 
-_INPUTS: Final = (Topic.STATES, Topic.SHAPES)
+_INPUTS: Final = (Topic.STATES, Topic.SHAPES, Topic.TRAJECTORIES)
 _REPEATED: Final = (Topic.MONITORED_STATES.path, Topic.MONITORED_SHAPES.path)
 """Where a monitor publishes its inputs again; used only if a bag lacks the inputs, which came from sources."""
 
@@ -109,6 +109,7 @@ def _write(
     if first is None:
         raise SessionError("expected messages of the mapped topics in the bag, got none")
     left_out = {Topic.SETTINGS}
+    left_out |= set() if feed is None else {Topic.TRAJECTORIES}
     left_out |= set() if pipeline.rules.text else {Topic.ALERTS}
     left_out |= set() if feed is not None else {Topic.SOURCES}
     types = {topic.of(): topic.message for topic in RECORDED if topic not in left_out}
@@ -152,6 +153,8 @@ def _feed(
         outputs = None
         if each.topic is Topic.STATES:
             outputs = pipeline.on_states(each.data)
+        elif each.topic is Topic.TRAJECTORIES:
+            pipeline.on_trajectories(each.data)
         else:
             pipeline.on_shapes(each.data)
             if each is first and pipeline.monitor.refused[Refusal.SHAPE]:

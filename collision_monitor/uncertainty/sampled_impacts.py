@@ -89,6 +89,9 @@ SPINNING_ITERATIONS: Final = 512
 """Iterations at least for a sample of convex bodies that spin by more than FAR (rad). Of a box that spins at 10 rad/s
 for 5 s beside a floor, 64 reach a time before the impact, which counts as one. So such pairs have few samples."""
 
+FARTHEST: Final = 100.0
+"""rad. Bodies that spin farther need more iterations than these, and get SEARCH_ITERATIONS."""
+
 SEARCH_ITERATIONS: Final = 8
 """Iterations of the search for a sample's impact with one mesh: 4,000 boxes or 1.2 ms. Ordinary ones take a tenth. Each
 sample of a disc of 100 km that turns beside a mesh took 20 ms. The same for bodies that turn too far for any search,
@@ -475,7 +478,7 @@ def impact_probabilities(
         if not has_mesh:
             coarse = min(coarse, _least_tolerance(multibody, i, j, (turn_i, turn_j), t, query.margin, work))
         coarse = max(query.tolerance, coarse)
-        if spins(A, B, horizon):
+        if spins(A, B, horizon) or (spin_rate(A) + spin_rate(B)) * horizon > FARTHEST:
             iterations = min(iterations, SEARCH_ITERATIONS)
         elif spins_far(A, B, horizon) and not is_one_search:
             iterations = max(iterations, SPINNING_ITERATIONS)

@@ -49,13 +49,13 @@ class Message(NamedTuple):
 def hostile_message(seed: int, index: int, now_ns: int) -> Message:
     """Return message `index` of a seed, sent at `now_ns`."""
     dice = Dice(seed, index)
-    topic = dice.random.choices((Topic.STATES, Topic.SHAPES, Topic.SETTINGS), (72, 25, 3))[0]
+    topic = dice.random.choices(list(_MAKERS), (67, 23, 3, 7))[0]
     data = _MAKERS[topic](dice, now_ns)
     if dice.is_hostile or dice.chance(0.05):
         other = _MAKERS[dice.random.choice((Topic.STATES, Topic.SHAPES))](dice, now_ns)
         data = spoiled(dice, data, other)
     if dice.is_hostile and dice.chance(0.1):
-        topic = dice.random.choice((Topic.STATES, Topic.SHAPES, Topic.SETTINGS))
+        topic = dice.random.choice(list(_MAKERS))
     return Message(topic, data)
 
 
@@ -179,6 +179,35 @@ def _model(dice: Dice) -> int:
     return int(dice.random.choice(list(Model))) if dice.chance(0.4) else 0
 
 
+# -- plans
+
+
+def plans(dice: Dice, now_ns: int) -> bytes:
+    """Return an ObjectTrajectoryArray for the attackers' objects: the answers to the known scene stay the same."""
+    writer = Writer("ObjectTrajectoryArray")
+    _header(writer, dice, now_ns)
+    count = dice.random.choices((0, 1, 3), (2, 88, 10))[0]
+    writer.scalar("u4", count, "trajectories")
+    for _ in range(count):
+        points = dice.random.choices((0, 1, 2, 8), (5, 2, 40, 53))[0]
+        if dice.is_hostile and dice.chance(0.05):
+            points = 3000
+        with np.errstate(all="ignore"):
+            times = np.cumsum([dice.number(0.05, 0.5) for _ in range(points)]) - dice.number(0.0, 0.5)
+        poses = [dice.pose(REACH) for _ in range(points - (dice.is_hostile and dice.chance(0.1)))]
+        twists = [dice.numbers(6, -2.0, 2.0) for _ in range(points if dice.chance(0.4) else 0)]
+        for rows in (times, poses, twists):
+            writer.scalar("u4", len(rows), "length")
+            if len(rows):
+                writer.raw(np.array(rows, "<f8").tobytes(), 8)
+        wide = dice.random.choice((0.0, 1.0, 100.0))
+        writer.raw(np.array([wide * dice.number(0.01, 1.0) for _ in range(4)], "<f8").tobytes(), 8)
+        writer.scalar("u4", FIRST_ID + dice.random.randrange(IDS), "id")
+        for what in ("between", "then"):
+            writer.scalar("u1", dice.word(8) if dice.is_hostile else dice.random.randrange(2), what)
+    return writer.finish()
+
+
 # -- settings
 
 
@@ -210,6 +239,7 @@ _MAKERS: Final[dict[Topic, Callable[[Dice, int], bytes]]] = {
     Topic.STATES: states,
     Topic.SHAPES: descriptions,
     Topic.SETTINGS: settings,
+    Topic.TRAJECTORIES: plans,
 }
 
 

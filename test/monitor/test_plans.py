@@ -286,13 +286,20 @@ def test_plans_end_are_replaced_and_begin_at_a_stamp() -> None:
     assert monitor.following == []
 
 
+def test_an_object_that_becomes_static_follows_no_plan() -> None:
+    monitor, turns = crossing()
+    monitor.step(0, moving(states([1, 2], turns, 0.0)))
+    monitor.add(1, cm.Sphere(0.2), static=True, pose=cm.Pose((0, 0, 0)), replace=True)
+    assert monitor.following == [2]
+    assert len(monitor.step(STEP, moving(states([2], turns[1:], 0.05))).predictions) == 0
+    cm.Monitor.restored(monitor.profile, Snapshot.decode(monitor.snapshot().encode()))
+
+
 def test_what_cannot_be_followed_is_refused() -> None:
     path = cm.Trajectory([0, 1], [(0, 0, 0), (1, 0, 0)])
     monitor = cm.Monitor()
     monitor.add(1, cm.Sphere(0.2))
     monitor.add(2, cm.Sphere(0.2), static=True, pose=cm.Pose((2, 0, 0)))
-    with pytest.raises(InputError, match="expected a step before a plan with a stamp"):
-        monitor.follow(1, path, stamp_ns=5)
     monitor.step(int(5e9), states([1], [path], 0.0))
     for arguments, named, text in [
         ((3, path), {}, "the id of an object that was described, got 3"),

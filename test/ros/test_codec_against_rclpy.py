@@ -87,6 +87,20 @@ def test_states(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", SEEDS)
+def test_trajectories(seed: int) -> None:
+    message = random_message(msg.ObjectTrajectoryArray, np.random.default_rng(seed))
+    it = codec.decode_trajectories(serialize_message(message))
+    assert (it.stamp_ns, it.frame_id) == (stamp(message), message.header.frame_id)
+    for each, wanted in zip(it.trajectories, message.trajectories, strict=True):
+        found = each.times.tolist(), each.poses.tolist(), each.twists.tolist()
+        assert found == (list(wanted.times), [flat(p) for p in wanted.poses], [flat(t) for t in wanted.twists])
+        assert each.tolerance.tolist() == [wanted.across, wanted.along, wanted.angle, wanted.time]
+        assert (each.object_id, each.between, each.then) == (wanted.id, wanted.between, wanted.then)
+    again = codec.encode_trajectories(it.stamp_ns, it.frame_id, it.trajectories)
+    assert deserialize_message(again, msg.ObjectTrajectoryArray) == message
+
+
+@pytest.mark.parametrize("seed", SEEDS)
 def test_contacts(seed: int) -> None:
     message = random_message(msg.ContactArray, np.random.default_rng(seed))
     data = serialize_message(message)

@@ -99,8 +99,9 @@ class Monitoring:
         resources.callback(self._recording.close)
         # Shapes first: if both wait, the executor takes them in this order.
         shapes = subscription(node, Topic.SHAPES, self._on_shapes)
+        plans = subscription(node, Topic.TRAJECTORIES, self._on_trajectories)
         states = subscription(node, Topic.STATES, self._on_states)
-        self._shapes_in, self._states_in = shapes.topic_name, states.topic_name
+        self._shapes_in, self._plans_in, self._states_in = shapes.topic_name, plans.topic_name, states.topic_name
         self._refusals = RefusalLog(self._pipeline, self._logger.warning)
         readable = self._contacts_out, self._markers_out
         self._readers = ContactReaders(readable, self._recording, self._pipeline)
@@ -237,7 +238,13 @@ class Monitoring:
         self._last_markers = now
         self._markers_out.publish(self._markers.draw(states.message.states, outputs.result))
 
-    # -- shapes and settings
+    # -- plans, shapes and settings
+
+    def _on_trajectories(self, data: bytes) -> None:
+        received = self._now()
+        self._pipeline.on_trajectories(data)
+        self._recording.write(Topic.TRAJECTORIES, data, received, received)
+        self._refusals.report(self._plans_in, time.monotonic_ns())
 
     def _on_shapes(self, data: bytes) -> None:
         received = self._now()

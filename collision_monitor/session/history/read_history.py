@@ -111,6 +111,8 @@ class _Gathered:
                     if not isinstance(each, Removal):
                         self._history.objects[each.object_id] = each
                         self._history.names.setdefault(each.name, set()).add(each.object_id)
+            case "ObjectTrajectoryArray" if self._pipeline is not None:
+                self._pipeline.on_trajectories(message.data)
             case "ParameterEvent" if self._changes:
                 if self._pipeline is not None:
                     self._pipeline.on_settings(message.data)

@@ -17,14 +17,14 @@ _METADATA_VERSION: Final = 9
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 _TOPICS: Final = (
     *(Topic.STATES, Topic.SHAPES, Topic.CONTACTS, Topic.PREDICTIONS, Topic.STATUS, Topic.SETTINGS, Topic.ALERTS),
-    Topic.SOURCES,
+    *(Topic.SOURCES, Topic.TRAJECTORIES),
 )
 _QOS: Final = {topic.message: topic.quality for topic in _TOPICS}
 _FULL_NAMES: Final = {topic.message: topic.type_name for topic in _TOPICS}
 RECORDED_TYPES: Final = tuple(_QOS)
 """The message types that a session holds."""
 
-INPUT_TYPES: Final = (Topic.STATES.message, Topic.SHAPES.message)
+INPUT_TYPES: Final = (Topic.STATES.message, Topic.SHAPES.message, Topic.TRAJECTORIES.message)
 """The types that the monitor subscribes to; all others are its answers and settings."""
 
 

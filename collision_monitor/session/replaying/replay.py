@@ -195,6 +195,8 @@ class _Replay:
         match message.type:
             case "ObjectDescriptionArray":
                 self._pipeline.on_shapes(message.data)
+            case "ObjectTrajectoryArray":
+                self._pipeline.on_trajectories(message.data)
             case "ParameterEvent":
                 self._pipeline.on_settings(message.data)
             case "ObjectStateArray":
