@@ -300,7 +300,7 @@ def _screws(moved: Array, turns: Array) -> Array:
 
 
 def _bend(shifts: Array, turns: Array) -> NDArray[np.bool_]:
-    """Whether bodies with these shifts and rotation vectors (N, 3) leave a straight line by more than round-off (N,)."""
+    """Whether twists with these shifts and rotation vectors (N, 3) leave a line by more than round-off (N,)."""
     across, turn, shift = (np.linalg.norm(each, axis=1) for each in (np.cross(turns, shifts), turns, shifts))
     return np.asarray(across > 4.0 * EPSILON * turn * shift)
 
