@@ -73,6 +73,7 @@ class Trajectory(Frozen):
     between: "straight", constant velocity and angular velocity (of a polyline with slerp); "arc", constant twist in the
     body's own frame, as a wheeled robot follows a path (Murray, Li and Sastry, 1994, 2.3); "curve", the cubic Hermite
     spline, with a constant angular velocity between two points. The default is "curve" with twists, "straight" without.
+    A curve is known to 1e-6 m, so an impact with what it touches or slides along is unresolved.
     then: what holds after the last point: "rest"; "go on" along the last piece; "unknown": no answer is clear beyond.
 
     >>> path = Trajectory([0, 1, 3], [(0, 0, 0), (1, 0, 0), (1, 4, 0)])
