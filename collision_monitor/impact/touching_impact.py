@@ -40,20 +40,27 @@ Larger: the change comes near GJK_TOUCHING. Smaller: a wheel whose axis is round
 
 
 @inlined
+def _reach(table: Any, s: int, R: Any, n: Vector) -> float:
+    """How far (m) a shape with the rotation R reaches along n; infinite: a half-space not along its normal."""
+    d = rotate_back(R, n)
+    if table.kind[s] == HALF_SPACE:
+        off = minus(d, (table.size[s, 0], table.size[s, 1], table.size[s, 2]))
+        return table.size[s, 3] if dot(off, off) <= ALIGNED else inf
+    return core_support(table, s, d[0], d[1], d[2]) + rounding(table, s)
+
+
+@inlined
 def _gap_along(table: Any, a: int, b: int, pose: PairPose, n: Vector) -> float:
     """Gap (m) of two shapes along n, from their support functions; negative if they overlap along it."""
     R_a, R_b, between = pose
-    if table.kind[b] == HALF_SPACE:
-        own = rotate_back(R_b, opposite(n))
-        normal = table.size[b, 0], table.size[b, 1], table.size[b, 2]
-        off = minus(own, normal)
-        reach_b = table.size[b, 3] if dot(off, off) <= ALIGNED else inf
-    else:
-        d = rotate_back(R_b, opposite(n))
-        reach_b = core_support(table, b, d[0], d[1], d[2])
-    d = rotate_back(R_a, n)
-    reach_a = core_support(table, a, d[0], d[1], d[2])
-    return dot(n, between) - reach_a - reach_b - rounding(table, a) - rounding(table, b)
+    return dot(n, between) - _reach(table, a, R_a, n) - _reach(table, b, R_b, opposite(n))
+
+
+@inlined
+def _is_about(w: Vector, n: Vector) -> bool:
+    """Whether an angular velocity is about n, or zero."""
+    across = cross(w, n)
+    return dot(across, across) <= ALIGNED * ALIGNED * dot(w, w)
 
 
 @inlined
@@ -62,8 +69,7 @@ def _turning(table: Any, s: int, R: Any, o: Vector, w: Vector, n: Vector) -> Vec
 
     That is one about n, of a ball, or of a wheel on its axle.
     """
-    across = cross(w, n)
-    if dot(across, across) <= ALIGNED * ALIGNED * dot(w, w):
+    if _is_about(w, n):
         return AT_REST
     if o[0] == 0.0 and o[1] == 0.0 and o[2] == 0.0:
         if BALL[table.kind[s]]:
@@ -77,10 +83,14 @@ def _turning(table: Any, s: int, R: Any, o: Vector, w: Vector, n: Vector) -> Vec
 
 @inlined
 def _rolling(table: Any, at: Placed, n: Vector) -> Placed:
-    """The shapes without rotations that leave their reach along n as it is, see `_turning`."""
+    """The shapes without rotations that leave their reach along n as it is, see `_turning`.
+
+    On an arc about n, an origin has a constant acceleration along n.
+    """
     w_a = _turning(table, at.a, at.R_a, at.o_a, at.w_a, n)
     w_b = _turning(table, at.b, at.R_b, at.o_b, at.w_b, n)
     acceleration, jerk, harder_a, harder_b = at.change
+    jerk = 0.0 if _is_about(at.w_a, n) and _is_about(at.w_b, n) else jerk
     harder_a = harder_a if dot(w_a, w_a) > 0.0 else AT_REST
     harder_b = harder_b if dot(w_b, w_b) > 0.0 else AT_REST
     change = PairChange(acceleration, jerk, harder_a, harder_b)

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import allocating_kernel
-from collision_monitor.checks.numbers import as_numbers
+from collision_monitor.checks.numbers import as_numbers, checked_number
 from collision_monitor.errors import PoseError
-from collision_monitor.motion.course import turned_for
+from collision_monitor.motion.course import ARC, turned_for
 from collision_monitor.motion.motion import turn_quaternion, twist_on
 from collision_monitor.motion.stated_motion import (
     ACCELERATION,
@@ -25,13 +25,10 @@ from collision_monitor.motion.stated_motion import (
     NUMBERS,
     REST,
     Motion,
-    flat_motion,
-    motion_of,
-    set_courses,
 )
-from collision_monitor.shapes.planar import flat_pose
+from collision_monitor.shapes.planar import flat_quaternions
 from collision_monitor.shapes.pose import Frozen, Pose, as_pose, multiply
-from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
+from collision_monitor.tolerances import EPSILON, LARGEST_INPUT, NORMALISED, UNIT_QUATERNION
 
 Array = NDArray[np.float64]
 Between = Literal["straight", "arc", "curve"]
@@ -46,12 +43,22 @@ FASTEST: Final = 1e5
 CURVE_TOLERANCE: Final = 1e-6
 """m: how far a curve may be from its pieces. Smaller: more pieces, by the root of the third order."""
 
+SHORTEST: Final = 1e-12
+"""s between two points. Less: the third derivative of a curve overflows. Such points have a wrong unit."""
+
+MOST_PIECES: Final = 1_000_000
+"""Pieces of all curves of a trajectory, 150 MB. One that needs more has wider tubes."""
+
 MOST_PARTS: Final = 256
-"""PairPieces of a curve between two points. A curve that needs more has a wider tube."""
+"""Pieces of a curve between two points. A curve that needs more has a wider tube."""
 
 CUBIC_ERROR: Final = 1.0 / 124.0
 """Largest distance of a cubic from the parabola through its ends and its middle, for a third derivative of 1 in a span
 of 1: sqrt(3) / 216, rounded up."""
+
+ROUND_OFF_ANGLE: Final = 64.0 * EPSILON
+"""rad, up to which two orientations are one: quaternions of one orientation, computed in two ways, differ by as much.
+Larger: a body jumps between two points. Smaller: a HalfSpace, which cannot turn, is refused for round-off."""
 
 SMALL_ANGLE: Final = 1e-4
 """rad, below which the series of the logarithm of a rotation is exact to round-off."""
@@ -83,6 +90,7 @@ class Trajectory(Frozen):
     between: "straight", constant velocity and angular velocity (of a polyline with slerp); "arc", constant twist in the
     body's own frame, as a wheeled robot follows a path (Murray, Li and Sastry, 1994, 2.3); "curve", the cubic Hermite
     spline, with a constant angular velocity between two points. The default is "curve" with twists, "straight" without.
+    A curve is known to 1e-6 m, so an impact with what it touches or slides along is unresolved.
     then: what holds after the last point: "rest"; "go on" along the last piece; "unknown": no answer is clear beyond.
 
     >>> path = Trajectory([0, 1, 3], [(0, 0, 0), (1, 0, 0), (1, 4, 0)])
@@ -92,6 +100,9 @@ class Trajectory(Frozen):
 
     times: Array
     poses: Array
+    twists: Array | None
+    """(N, 3): linear velocities at the points, as far as they were given."""
+    between: Between
     then: Then
     begins: Array
     """(M,): s at which each piece begins."""
@@ -110,10 +121,10 @@ class Trajectory(Frozen):
         _check_choice(then, "then", get_args(Then))
         known["times"] = times = _checked_times(times)
         known["poses"] = poses = _checked_poses(poses, len(times))
-        velocities = _checked_velocities(twists, len(times)) if twists is not None else None
+        known["twists"] = velocities = None if twists is None else _checked_velocities(twists, len(times))
         if between == "curve" and velocities is None:
             raise PoseError("twists: expected linear velocities at the points of a curve, got none")
-        known["then"] = then
+        known["between"], known["then"] = between, then
         spans = np.diff(times)
         turns = _rotation_vectors(poses[:-1, 3:], poses[1:, 3:])
         rows = _still_rows(poses[:-1])
@@ -125,9 +136,9 @@ class Trajectory(Frozen):
         if between == "curve" and velocities is not None:
             rows, begins, tubes = _curves(times, poses, velocities, rows)
         elif between == "arc":
-            rows[:, LINEAR:ANGULAR] = _screws(poses, turns) / spans[:, None]
-            rows[:, ANGULAR:ACCELERATION] = _turned_back(poses[:-1, 3:], rows[:, ANGULAR:ACCELERATION])
-            set_courses(rows, True, True, False)
+            shifts = _screws(np.diff(poses[:, :3], axis=0), turns)
+            rows[:, LINEAR:ANGULAR] = shifts / spans[:, None]
+            rows[_bend(shifts, turns), COURSE] = ARC
         else:
             rows[:, LINEAR:ANGULAR] = secants
         first, last = _still_rows(poses[:1]), _still_rows(poses[-1:])
@@ -138,13 +149,18 @@ class Trajectory(Frozen):
         known["numbers"] = np.concatenate([first, rows, last])
         known["begins"] = np.concatenate([[-LARGEST_INPUT], begins, times[-1:]])
         known["tubes"] = np.concatenate([[0.0], tubes, [0.0]])
-        for name in ("times", "poses", "numbers", "begins", "tubes"):
-            known[name].setflags(write=False)
+        for each in known.values():
+            if isinstance(each, np.ndarray):
+                each.setflags(write=False)
 
     def __repr__(self) -> str:
         """Return how many points there are, when they are, and what follows, for a person."""
         first, last = self.times[0], self.times[-1]
         return f"{type(self).__name__}({len(self.times)} points, {first:g} to {last:g} s, then {self.then})"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles hold what it was made of."""
+        return _made_of, (self.times, self.poses, self.twists, self.between, self.then)
 
     @property
     def pose(self) -> Pose:
@@ -166,23 +182,39 @@ class Trajectory(Frozen):
         return carried(self.numbers[k], times - self.begins[k])
 
     def at(self, time: float) -> Pose:
-        """The pose at a time (s)."""
-        return Pose.of_numbers(self.rows(np.array([float(time)]))[0, :LINEAR].tolist())
+        """The pose at a time (s). Raises PoseError."""
+        time = checked_number(time, "time", "s", error=PoseError)
+        return Pose.of_numbers(self.rows(np.array([time]))[0, :LINEAR].tolist())
 
     def flat(self) -> Trajectory:
         """The trajectory of a shape in the x-y plane, without what leads out of it. Raises PoseError."""
-        made = object.__new__(Trajectory)
-        numbers = np.empty_like(self.numbers)
-        for k, row in enumerate(self.numbers):
-            pose = Pose.of_numbers(row[:LINEAR].tolist())
-            flat = flat_motion(motion_of(pose, row), flat_pose(pose))
-            numbers[k] = (*flat.pose.numbers, *flat.numbers)
-        made.__dict__.update(self.__dict__, numbers=numbers)
-        return made
+        known: Trajectory | None = self.__dict__.get("_flat")
+        if known is None:
+            known = self.__dict__["_flat"] = _flat(self)
+        return known
+
+
+def _made_of(times: Array, poses: Array, twists: Array | None, between: Between, then: Then) -> Trajectory:
+    return Trajectory(times, poses, twists, between=between, then=then)
+
+
+def _flat(path: Trajectory) -> Trajectory:
+    """The trajectory through the points of another one without height and tilt. Raises PoseError."""
+    poses, twists = np.zeros_like(path.poses), None
+    poses[:, :2], poses[:, 3:] = path.poses[:, :2], flat_quaternions(path.poses[:, 3:])
+    down = np.flatnonzero(~poses[:, 3:].any(axis=1))
+    if len(down):
+        quaternion = path.poses[down[0], 3:].tolist()
+        raise PoseError(
+            f"expected z to point up for a shape of the plane, got quaternion {quaternion} at point {down[0]}"
+        )
+    if path.twists is not None:
+        twists = path.twists * (1.0, 1.0, 0.0)
+    return _made_of(path.times, poses, twists, path.between, path.then)
 
 
 def _check_choice(value: Any, name: str, choices: tuple[str, ...]) -> None:
-    if value not in choices:
+    if not (isinstance(value, str) and value in choices):
         raise PoseError(f"{name}: expected one of {', '.join(map(repr, choices))}, got {value!r:.100}")
 
 
@@ -190,19 +222,26 @@ def _checked_times(times: Any) -> Array:
     array = np.array(as_numbers(times, "times", "numbers (N,)", PoseError))
     if array.ndim != 1 or not 2 <= len(array) <= MOST_POINTS:
         raise PoseError(f"times: expected 2 to {MOST_POINTS} numbers (N,), got shape {array.shape}")
-    if not (np.abs(array) <= LARGEST_INPUT).all():
-        raise PoseError(f"times: expected finite numbers up to {LARGEST_INPUT:g}, got {array[~np.isfinite(array)][:1]}")
+    bad = np.flatnonzero(~(np.abs(array) <= LARGEST_INPUT))
+    if len(bad):
+        k = int(bad[0])
+        raise PoseError(f"times: expected finite numbers up to {LARGEST_INPUT:g}, got {array[k]:g} at point {k}")
     late = np.flatnonzero(~(np.diff(array) > 0.0))
     if len(late):
         k = int(late[0])
         raise PoseError(f"times: expected rising ones, got {array[k]:g} and then {array[k + 1]:g} at point {k + 1}")
+    close = np.flatnonzero(np.diff(array) < SHORTEST)
+    if len(close):
+        k = int(close[0])
+        raise PoseError(f"times: expected at least {SHORTEST:g} s between two points, got {array[k + 1] - array[k]:g} "
+                        f"from point {k} on")  # fmt: skip
     return array
 
 
 def _checked_poses(poses: Any, count: int) -> Array:
     if isinstance(poses, np.ndarray) and poses.ndim == 2:
         rows = np.array(as_numbers(poses, "poses", "numbers (N, 7)", PoseError))
-    elif isinstance(poses, list | tuple | np.ndarray):
+    elif isinstance(poses, list | tuple) or (isinstance(poses, np.ndarray) and poses.ndim):
         rows = np.array([as_pose(each, f"poses, point {k}").numbers for k, each in enumerate(poses)]).reshape(-1, 7)
     else:
         raise PoseError(f"poses: expected an array (N, 7) or a sequence of poses, got {type(poses).__name__}")
@@ -220,7 +259,7 @@ def _checked_poses(poses: Any, count: int) -> Array:
         raise PoseError(
             f"poses: expected quaternions of unit length within {UNIT_QUATERNION:g}, got {norms[k]:g} at point {k}"
         )
-    rows[:, 3:] /= norms[:, None]
+    rows[:, 3:] /= np.where(np.abs(norms - 1.0) > NORMALISED, norms, 1.0)[:, None]
     return rows
 
 
@@ -260,34 +299,34 @@ def _rotation_vectors(before: Array, after: Array) -> Array:
     turn = multiply(after, before * (-1.0, -1.0, -1.0, 1.0))
     turn *= np.where(turn[:, 3:] < 0.0, -1.0, 1.0)
     sine = np.linalg.norm(turn[:, :3], axis=1)
+    sine[sine <= 0.5 * ROUND_OFF_ANGLE] = 0.0
+    turn[sine == 0.0, :3] = 0.0
     angle = 2.0 * np.arctan2(sine, turn[:, 3])
     return turn[:, :3] * np.where(sine > 0.0, angle / np.where(sine > 0.0, sine, 1.0), 2.0)[:, None]
 
 
-def _turned_back(quaternions: Array, vectors: Array) -> Array:
-    """Vectors (N, 3) of the world along the axes of bodies with quaternions (N, 4)."""
-    back = quaternions * (-1.0, -1.0, -1.0, 1.0)
-    return multiply(multiply(back, np.pad(vectors, ((0, 0), (0, 1)))), quaternions)[:, :3]
+def _screws(moved: Array, turns: Array) -> Array:
+    """Velocities (N, 3) at first of the constant twists with which bodies move by `moved` (N, 3) in 1 s. World axes.
 
-
-def _screws(poses: Array, turns: Array) -> Array:
-    """Shifts (N - 1, 3), along the first body's axes, of the constant twists that take each pose to the next in 1 s.
-
-    turns: rotation vectors. (Murray, Li and Sastry, 1994, 2.3: logarithm of a rigid motion)
+    turns (N, 3): rotation vectors. (Murray, Li and Sastry, 1994, 2.3: logarithm of a rigid motion)
     """
-    w = _turned_back(poses[:-1, 3:], turns)
-    p = _turned_back(poses[:-1, 3:], np.diff(poses[:, :3], axis=0))
-    angle = np.linalg.norm(w, axis=1)
+    angle = np.linalg.norm(turns, axis=1)
     is_small = angle < SMALL_ANGLE
     safe = np.where(is_small, 1.0, angle)
     half = 0.5 * safe
     tail = np.where(is_small, 1.0 / 12.0, (1.0 - half * np.cos(half) / np.sin(half)) / (safe * safe))
-    across = np.cross(w, p)
-    return p - 0.5 * across + tail[:, None] * np.cross(w, across)
+    across = np.cross(turns, moved)
+    return moved - 0.5 * across + tail[:, None] * np.cross(turns, across)
+
+
+def _bend(shifts: Array, turns: Array) -> NDArray[np.bool_]:
+    """Whether twists with these shifts and rotation vectors (N, 3) leave a line by more than round-off (N,)."""
+    across, turn, shift = (np.linalg.norm(each, axis=1) for each in (np.cross(turns, shifts), turns, shifts))
+    return np.asarray(across > 4.0 * EPSILON * turn * shift)
 
 
 def _curves(times: Array, poses: Array, velocities: Array, rows: Array) -> tuple[Array, Array, Array]:
-    """PairPieces of the cubic Hermite spline through points with velocities (N, 3): numbers, begins and tubes.
+    """Pieces of the cubic Hermite spline through points with velocities (N, 3): numbers, begins and tubes.
 
     rows: those between the points, with their angular velocities.
     """
@@ -298,6 +337,8 @@ def _curves(times: Array, poses: Array, velocities: Array, rows: Array) -> tuple
     j = 6.0 * (v + v_end - 2.0 * secant) / (h * h)
     off = np.linalg.norm(j, axis=1) * h[:, 0] ** 3 * CUBIC_ERROR
     parts = np.clip(np.ceil(np.cbrt(off / CURVE_TOLERANCE)), 1, MOST_PARTS).astype(int)
+    if parts.sum() > MOST_PIECES:
+        parts = np.maximum(parts * MOST_PIECES // parts.sum(), 1)
     k = np.repeat(np.arange(len(parts)), parts)
     nth = np.arange(len(k)) - np.repeat(np.cumsum(parts) - parts, parts)
     span = (h[:, 0] / parts)[k][:, None]
@@ -359,8 +400,8 @@ def pair_pieces(a: Motion | Trajectory, b: Motion | Trajectory, horizon: float) 
     """The parts of the time from now to the horizon (s), or to where one of the motions is unknown from."""
     end = min(horizon, known_until(a), known_until(b))
     begins = [each.begins for each in (a, b) if isinstance(each, Trajectory)]
-    inner = np.unique(np.concatenate([[0.0], *begins]))
-    starts = inner[(inner >= 0.0) & ((inner < end) | (inner == 0.0))]
+    within = [each[np.searchsorted(each, 0.0, side="right") : np.searchsorted(each, end)] for each in begins]
+    starts = np.unique(np.concatenate([[0.0], *within]))
     rows, tubes = [], np.zeros((len(starts), 2))
     for side, each in enumerate((a, b)):
         if isinstance(each, Trajectory):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 import collision_monitor as cm
 from collision_monitor.errors import PoseError
+from collision_monitor.motion import trajectory
 from collision_monitor.motion.trajectory import CURVE_TOLERANCE, MOST_POINTS
 
 Array = NDArray[np.float64]
@@ -118,12 +121,103 @@ def test_poses_in_every_form_and_a_plan_that_began_before() -> None:
         (([0, 1, 2], LINE, np.full((3, 6), 1e18)), {}, "twists: expected finite numbers up to 100000"),
         (([0, 1, 2], LINE), {"between": "curve"}, "twists: expected linear velocities"),
         (([0, 1, 2], LINE), {"between": "quintic"}, "between: expected one of 'straight', 'arc', 'curve'"),
+        (([0, 1, 1e19], LINE), {}, r"times: expected finite numbers up to 1e\+18, got 1e\+19 at point 2"),
+        (([0, 1e-200, 1], LINE, np.full((3, 3), 1e5)), {}, "times: expected at least 1e-12 s between two points, got"),
+        (([0, 5e-324, 1], LINE), {}, "times: expected at least 1e-12 s between two points, got"),
+        (([0, 1], np.array(5.0)), {}, "poses: expected an array"),
+        (([0, 1], np.full((2, 7), 1e200)), {}, "poses: expected finite numbers up to"),
+        (([0, 1, 2], LINE), {"between": np.array(["arc", "curve"])}, "between: expected one of"),
+        (([0, 1, 2], LINE), {"then": np.array(["rest", "rest"])}, "then: expected one of"),
         (([0, 1, 2], LINE), {"then": "explode"}, "then: expected one of 'rest', 'go on', 'unknown'"),
     ],
 )
 def test_what_is_no_plan_is_refused(arguments: tuple[Any, ...], named: dict[str, Any], text: str) -> None:
     with pytest.raises(PoseError, match=text):
         cm.Trajectory(*arguments, **named)
+
+
+@pytest.mark.parametrize("time", [np.nan, np.inf, "soon", None, [1.0, 2.0]])
+def test_a_time_that_is_none_is_refused(time: Any) -> None:
+    with pytest.raises(PoseError, match="time: expected a finite number of s, got"):
+        cm.Trajectory([0, 1], LINE[:2]).at(time)
+
+
+@pytest.mark.parametrize("between", ["straight", "curve", "arc"])
+def test_copies_are_equal_to_the_bit_and_never_change(between: Any) -> None:
+    times, poses, twists = points(np.random.default_rng(3), 9)
+    path = cm.Trajectory(times, poses, twists, between=between, then="go on")
+    for other in (copy.copy(path), copy.deepcopy(path), pickle.loads(pickle.dumps(path))):
+        for name in ("times", "poses", "twists", "begins", "numbers", "tubes"):
+            assert getattr(other, name).tobytes() == getattr(path, name).tobytes()
+            assert not getattr(other, name).flags.writeable
+        assert (other.between, other.then, repr(other)) == (between, "go on", repr(path))
+
+
+def test_quaternions_of_unit_length_stay_as_they_are_to_the_bit() -> None:
+    poses = [cm.Pose((0, 0, 0), each) for each in Rotation.random(50, random_state=1).as_quat()]
+    path = cm.Trajectory(range(50), poses)
+    assert [tuple(row) for row in path.poses.tolist()] == [each.numbers for each in poses]
+
+
+def test_orientations_that_differ_by_round_off_do_not_turn() -> None:
+    """Each is that of the first, by another way."""
+    turns = [Rotation.from_euler("z", k * 0.7) * Rotation.from_euler("z", 0.3 - k * 0.7) for k in range(40)]
+    path = cm.Trajectory(range(40), np.concatenate([np.zeros((40, 3)), [each.as_quat() for each in turns]], axis=1))
+    assert len(np.unique(path.poses[:, 3:], axis=0)) > 1
+    assert not path.angular.any()
+    turned = cm.Trajectory([0, 1], [cm.Pose(), cm.Pose.from_euler(0, 0, 1e-13)])
+    assert turned.angular[1] == pytest.approx([0, 0, 1e-13], abs=1e-20)
+
+
+def test_a_wild_curve_of_many_points_has_wider_tubes_in_place_of_more_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(trajectory, "MOST_PIECES", 300)
+    rng = np.random.default_rng(11)
+    times, poses, velocities = np.arange(50) * 1.0, rng.normal(size=(50, 3)), rng.normal(size=(50, 3)) * 100.0
+    path = cm.Trajectory(times, poses, velocities)
+    assert len(path.begins) <= 300 + 50 + 2
+    assert path.tubes.max() > CURVE_TOLERANCE
+    ts = rng.uniform(0.0, 49.0, 5000)
+    off = np.linalg.norm(path.rows(ts)[:, :3] - CubicHermiteSpline(times, poses, velocities)(ts), axis=1)
+    assert (off <= path.tubes[path.piece(ts)] + 1e-9).all()
+
+
+@pytest.mark.parametrize("between", ["straight", "curve", "arc"])
+def test_in_the_plane_a_plan_has_neither_height_nor_tilt_and_no_jumps(between: Any) -> None:
+    rng = np.random.default_rng(13)
+    position, yaw = rng.normal(size=(8, 3)), np.cumsum(rng.uniform(-1.0, 1.0, 8))
+    tilt = np.stack([yaw, *rng.uniform(-0.4, 0.4, (2, 8))], axis=1)
+    whole, flat = (
+        cm.Trajectory(
+            np.arange(8.0),
+            np.concatenate([position * scale, Rotation.from_euler("ZYX", tilt * angles).as_quat()], axis=1),
+            rng.normal(size=(8, 3)) * scale if between == "curve" else None,
+            between=between,
+        )
+        for scale, angles in (((1, 1, 1), (1, 1, 1)), ((1, 1, 0), (1, 0, 0)))
+    )
+    found = whole.flat()
+    for t in np.linspace(0.0, 7.0, 50):
+        assert found.at(t).rotation[2] == pytest.approx([0, 0, 1]) and found.at(t).position[2] == 0.0
+        if between == "straight":
+            assert found.at(t).position == pytest.approx(flat.at(t).position)
+    for k in range(1, 7):
+        before, after = found.at(k - 1e-12), found.at(k)
+        assert before.matrix == pytest.approx(after.matrix, abs=1e-9)
+    assert found is whole.flat()
+    with pytest.raises(PoseError, match=r"expected z to point up for a shape of the plane, got .* at point 1"):
+        cm.Trajectory([0, 1], [cm.Pose(), cm.Pose((0, 0, 0), (1, 0, 0, 0))]).flat()
+
+
+@pytest.mark.parametrize("span", [1e-6, 1.0, 1e6, 1e9, 1e12])
+def test_an_arc_is_the_same_in_every_unit_of_time(span: float) -> None:
+    """It was straight if the body took more than 1e9 s for a radian, as with times in nanoseconds, and then jumped."""
+    rng = np.random.default_rng(29)
+    for size in (1.0, 1e-3):
+        end = cm.Pose(rng.normal(size=3) * 0.01, Rotation.from_rotvec(rng.normal(size=3) * 0.005 * size).as_quat())
+        path = cm.Trajectory([0, span], [cm.Pose(), end], between="arc")
+        for part in (0.3, 0.5, 1.0 - 1e-9):
+            wanted = expm(part * np.real(logm(end.matrix)))
+            assert path.at(part * span).matrix == pytest.approx(wanted, abs=1e-9)
 
 
 def test_a_pose_that_turns_faster_than_any_body_is_refused() -> None:

@@ -14,13 +14,13 @@ from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.impact.mesh_pair import SURFACES
 from collision_monitor.meshes.advance.approach import time_until
 from collision_monitor.motion.motion import MOTION, half_acceleration, most_turning, relative_velocity
-from collision_monitor.motion.stated_motion import Motion
-from collision_monitor.motion.trajectory import Trajectory
+from collision_monitor.motion.stated_motion import LINEAR, Motion
+from collision_monitor.motion.trajectory import Trajectory, carried
+from collision_monitor.query.body import QueryBody
 from collision_monitor.query.contact.contact_kernel import contact_row
 from collision_monitor.query.contact.open_gap import location_of
 from collision_monitor.query.impact.impact_kernel import set_motion
 from collision_monitor.query.impact.impact_query import ITERATIONS, MotionQuery, check_query
-from collision_monitor.query.impact.moving_body import MovingBody
 from collision_monitor.query.impact.planned_impact import PlannedPair, next_planned_impact, planned_pair
 from collision_monitor.shapes.compound import Compound
 from collision_monitor.shapes.pose import Pose
@@ -61,8 +61,9 @@ def impacts(
 
     The entries are those of `time_of_impact` with this tolerance, from the exit before on. On the way to an exit, an
     overlap of a depth lasts for as long as no point can move by that depth (conservative advancement, Mirtich 1996,
-    from inside). A gap that is found to be less than two tolerances (m) ends no contact. most: intervals; the rest is
-    left out. From where a Trajectory is unknown on, there is an interval without an end. Raises as `time_of_impact`.
+    from inside). A gap that is found to be less than two tolerances (m), and than how far a curve is off its pieces,
+    ends no contact. most: intervals; the rest is left out. From where a Trajectory is unknown on, there is an interval
+    without an end. Raises as `time_of_impact`.
 
     >>> import collision_monitor as cm
     >>> still, swings = cm.Motion(cm.Pose((1, 0, 0))), cm.Motion(cm.Pose(), angular=(0, 0, 3.2))
@@ -95,7 +96,8 @@ def _exit(pair: PlannedPair, begin: float, query: MotionQuery) -> tuple[float, f
     for k in range(pair.piece(begin), len(borders) - 1):
         start = float(borders[k])
         within = query._replace(horizon=float(borders[k + 1]) - start)
-        stays, apart = _exit_within(pair.moving(k), max(begin - start, 0.0), within, float(pair.pieces.tubes[k].sum()))
+        numbers, tube = np.stack([pair.pieces.a[k], pair.pieces.b[k]]), float(pair.pieces.tubes[k].sum())
+        stays, apart = _exit_within((pair.a, pair.b), numbers, max(begin - start, 0.0), within, tube)
         lasts = max(lasts, start + stays)
         if apart < inf:
             return lasts, start + apart
@@ -103,21 +105,22 @@ def _exit(pair: PlannedPair, begin: float, query: MotionQuery) -> tuple[float, f
 
 
 def _exit_within(
-    pair: tuple[MovingBody, MovingBody], begin: float, query: MotionQuery, tube: float
+    pair: tuple[QueryBody, QueryBody], numbers: Any, begin: float, query: MotionQuery, tube: float
 ) -> tuple[float, float]:
     """`_exit` within one piece of both motions, from `begin` on; the horizon is its end.
 
-    tube (m): how far the bodies may be off it. The first time is -inf where no contact is certain in the piece.
+    numbers (2, NUMBERS): of both motions. tube (m): how far the bodies may be off the piece. The first time is -inf
+    where no contact is certain in the piece.
     """
     a, b = pair
     lasts = -inf
-    t, horizon, numbers = begin, query.horizon, np.array([[*m.pose.numbers, *m.numbers] for m in (a.motion, b.motion)])
+    t, horizon = begin, query.horizon
     # a half-space, of infinite radius, does not turn
-    arms = np.array([each.body.radius if each.body.radius < inf else 0.0 for each in (a, b)])
+    arms = np.array([each.radius if each.radius < inf else 0.0 for each in (a, b)])
     memory, stay = np.zeros(2, MOTION), np.empty(2)
-    slots, later = (a.body.slots.first, b.body.slots.first), 0.0
+    slots, later = (a.slots.first, b.slots.first), 0.0
     for _ in range(STEPS):
-        now = a.motion.at(t + later), b.motion.at(t + later)
+        now = [Pose.of_numbers(row[:LINEAR].tolist()) for row in carried(numbers, np.full(2, t + later))]
         gap, bound, _ = contact_row(slots[0], now[0], slots[1], now[1], SURFACES)
         gap, bound = gap - query.separation, bound + tube
         if gap - bound > 2.0 * query.tolerance and not _is_inside(a, b, now):
@@ -138,11 +141,11 @@ def _exit_within(
     return lasts, inf
 
 
-def _is_inside(a: MovingBody, b: MovingBody, now: tuple[Pose, Pose]) -> bool:
+def _is_inside(a: QueryBody, b: QueryBody, now: list[Pose]) -> bool:
     """Whether one body may be inside the other, whose surface it does not touch: solid meshes alone hide that."""
-    if not (a.body.has_mesh or b.body.has_mesh):
+    if not (a.has_mesh or b.has_mesh):
         return False
-    return any(place != Location.OUTSIDE for place in location_of(a.body, now[0], b.body, now[1]))
+    return any(place != Location.OUTSIDE for place in location_of(a, now[0], b, now[1]))
 
 
 @kernel

@@ -76,11 +76,10 @@ def touching_pieces(moving: MovingBody, other: MovingBody, near: float) -> Posed
     """
     pieces: list[tuple[Shape, Pose]] = []
     for shape, pose in moving.body.shapes:
-        at = moving.motion.pose @ pose
         if isinstance(shape, Points):
-            own = _near_points(shape, at, other, near)
+            own = _near_points(shape, moving.motion.pose @ pose, other, near)
         elif isinstance(shape, Mesh) and len(shape.faces) > MANY_FACES and is_concave_mesh(shape):
-            own = _near_faces(shape, at, other, near)
+            own = _near_faces(shape, moving.motion.pose @ pose, other, near)
         else:
             pieces += containing_model([(shape, pose)], "exact").pieces
             continue

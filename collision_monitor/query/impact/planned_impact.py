@@ -37,13 +37,13 @@ class PlannedPair(NamedTuple):
         motions = [motion_of(Pose.of_numbers(row[:LINEAR].tolist()), row) for row in rows]
         return MovingBody(self.a, motions[0]), MovingBody(self.b, motions[1])
 
-    def from_time(self, begin: float) -> PlannedPair:
-        """The pair from a time (s) on, which becomes a border."""
+    def rest_of_piece(self, begin: float) -> PlannedPair:
+        """The pair from a time (s) on to the end of the piece that holds then."""
         k = self.piece(begin)
         borders, a, b, tubes = self.pieces
         age = np.array([begin - borders[k]])
-        a, b = (np.concatenate([carried(each[k : k + 1], age), each[k + 1 :]]) for each in (a, b))
-        return self._replace(pieces=PairPieces(np.append(begin, borders[k + 1 :]), a, b, tubes[k:]))
+        a, b = (carried(each[k : k + 1], age) for each in (a, b))
+        return self._replace(pieces=PairPieces(np.array([begin, borders[k + 1]]), a, b, tubes[k : k + 1]))
 
     def query(self, k: int, query: MotionQuery, wider: float = 0.0) -> MotionQuery:
         """A query within piece k alone, with a separation that is wider by some of its tubes."""
@@ -79,8 +79,17 @@ def next_planned_impact(pair: PlannedPair, query: MotionQuery, begin: float) -> 
     """Lower and upper (s) of the first impact from `begin` (s) on, where the bodies are apart; infinite for none."""
     k, earliest = pair.piece(begin), inf
     if begin > pair.pieces.borders[k]:
-        rest = pair.from_time(begin)
-        return next_planned_impact(rest, query, begin)
+        earliest, upper = _impact_from_piece(pair.rest_of_piece(begin), query, 0)
+        if upper < inf:
+            return earliest, upper
+        k += 1
+    lower, upper = _impact_from_piece(pair, query, k)
+    return min(earliest, lower), upper
+
+
+def _impact_from_piece(pair: PlannedPair, query: MotionQuery, k: int) -> tuple[float, float]:
+    """Lower and upper (s) of the first impact from the begin of piece k on; infinite for none."""
+    earliest = inf
     chains, borders = (pair.a.slots.first, pair.b.slots.first), pair.pieces.borders
     is_certain = pair.a.inside == pair.b.inside == CERTAIN
     lower, upper, code = inf, inf, TOUCHES

@@ -133,6 +133,31 @@ def test_a_body_that_slides_on_the_floor_along_its_plan_has_no_impact_with_it() 
         cm.time_of_impact(floor, turns, box, still)
 
 
+@pytest.mark.parametrize("floor", [cm.HalfSpace((0, 0, 1)), cm.Box((40, 40, 2))], ids=["half-space", "slab"])
+@pytest.mark.parametrize("body", [cm.Box((0.4, 0.4, 0.2)), cm.Sphere(0.1), cm.Cylinder(0.3, 0.2)], ids=str)
+def test_what_slides_on_a_floor_along_an_arc_has_no_impact_with_it_in_either_order(floor: Any, body: Any) -> None:
+    rng = np.random.default_rng(31)
+    for _ in range(10):
+        X = cm.Pose(rng.normal(size=3), Rotation.random(random_state=rng).as_quat())
+        down = X @ cm.Pose((0, 0, -1.0 if isinstance(floor, cm.Box) else 0.0))
+        bends, z = [cm.Pose()], 0.1
+        for turn in rng.uniform(-0.7, 0.7, 4):
+            bends.append(bends[-1] @ cm.Pose.from_euler(0, 0, turn, (0.3, 0.3 * turn / 2, 0)))
+        path = cm.Trajectory(range(5), [X @ cm.Pose((0, 0, z)) @ each for each in bends], between="arc")
+        robot = cm.Motion(X @ cm.Pose((0, 0, z)), (1, 0, 0), (0, 0, 0.8), (-0.2, 0, 0), frame="body", stops=True)
+        dips = cm.Trajectory(
+            range(5), [X @ cm.Pose((0, 0, z - 0.05 * (k == 4))) @ each for k, each in enumerate(bends)]
+        )
+        for moves in (path, robot):
+            assert cm.time_of_impact(body, moves, floor, cm.Motion(down), 6.0).status == "clear"
+            assert cm.time_of_impact(floor, cm.Motion(down), body, moves, 6.0).status == "clear"
+        for found in (
+            cm.time_of_impact(body, dips, floor, cm.Motion(down), 6.0),
+            cm.time_of_impact(floor, cm.Motion(down), body, dips, 6.0),
+        ):
+            assert found.status == "hit" and found.lower == pytest.approx(3.0, abs=1e-4)
+
+
 def test_what_comes_after_an_unknown_end_is_unresolved() -> None:
     path, still = cm.Trajectory([0, 1], [(0, 0, 0), (1, 0, 0)], then="unknown"), cm.Motion((5, 0, 0))
     ball = cm.Sphere(0.5)
