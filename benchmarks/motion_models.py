@@ -206,10 +206,10 @@ KINDS: Final = (
     Kind("braking car, people", braking_car, ("twist", "acceleration", "stops"), "crosses"),
     Kind("braking car, people behind", braking_car, ("twist", "acceleration", "stops"), "behind"),
     Kind("car that brakes in a bend", car_that_brakes_in_a_bend, ("twist", "acceleration", "arc that stops")),
-    Kind("path of two bends", path_of_two_bends, ("twist", "acceleration", "arc")),
-    Kind("gate that closes later", gate, ("twist",)),
-    Kind("ball with drag", ball_with_drag, ("twist", "acceleration")),
-    Kind("pendulum", pendulum, ("twist", "acceleration", "arc")),
+    Kind("path of two bends", path_of_two_bends, ("twist", "acceleration", "arc", "plan")),
+    Kind("gate that closes later", gate, ("twist", "plan")),
+    Kind("ball with drag", ball_with_drag, ("twist", "acceleration", "plan")),
+    Kind("pendulum", pendulum, ("twist", "acceleration", "arc", "plan")),
 )
 
 FLAGS: Final = {
@@ -218,7 +218,11 @@ FLAGS: Final = {
     "arc": BODY,
     "stops": VALID | STOPS,
     "arc that stops": BODY | VALID | STOPS,
+    "plan": StateFlag(0),
 }
+
+PLANNED: Final = 5
+"""Ticks between two points of a plan, 0.02 s."""
 
 
 def encounter(kind: Kind, rng: np.random.Generator, ticks: Ticks) -> Encounter:
@@ -291,6 +295,15 @@ def states_of(it: Encounter, model: str) -> NDArray[np.void]:
     return rows
 
 
+def plan_of(path: Path3, ticks: Ticks) -> cm.Trajectory:
+    """The path as a planner publishes it: a point every 0.02 s; of what does not turn, with its velocities."""
+    velocities = np.gradient(path.position, ticks, axis=0)
+    at = np.unique([*range(0, len(ticks), PLANNED), len(ticks) - 1])
+    if (path.quaternion == path.quaternion[0]).all():
+        return cm.Trajectory(ticks[at], path.poses()[at], velocities[at], then="go on")
+    return cm.Trajectory(ticks[at], path.poses()[at], between="arc", then="go on")
+
+
 @dataclass
 class Score:
     """Counts over encounters, and the errors of the predicted times (s)."""
@@ -311,7 +324,7 @@ class Score:
         )
 
 
-def score(encounters: list[tuple[Encounter, float]], model: str, horizon: float) -> Score:
+def score(encounters: list[tuple[Encounter, float]], model: str, horizon: float, ticks: Ticks) -> Score:
     """Predict each encounter with a new monitor of two bodies, and compare with its true time."""
     found, errors = Score(), []
     profile = Profile.named("balanced").replace(horizon=horizon)
@@ -321,6 +334,8 @@ def score(encounters: list[tuple[Encounter, float]], model: str, horizon: float)
         monitor = cm.Monitor(profile)
         for k in range(2):
             monitor.add(k + 1, it.shapes[k])
+        if model == "plan":
+            monitor.follow(1, plan_of(it.paths[0], ticks))
         rows = monitor.step(SECOND, states_of(it, model)).predictions
         is_certain = len(rows) > 0 and rows["status"][0] == PredictionStatus.HIT
         found.certain += is_certain
@@ -395,7 +410,7 @@ def main() -> int:
         known = [(it, true_time(it, ticks)) for it in made]
         for model in kind.models:
             for horizon in HORIZONS:
-                found = results[kind.name, model, horizon] = score(known, model, horizon)
+                found = results[kind.name, model, horizon] = score(known, model, horizon, ticks)
                 print(line(kind, model, horizon, found), flush=True)
     if args.png:
         draw(results, args.png)
