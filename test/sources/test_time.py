@@ -197,6 +197,35 @@ def test_objects_without_stamps_go_on_when_the_others_are_silent() -> None:
     assert len(fed.steps) >= 85
 
 
+@pytest.mark.parametrize("speed", [0.05, 0.5, 1.0, 2.0])
+def test_objects_without_stamps_take_the_time_of_tf_if_nothing_else_has_one(speed: float) -> None:
+    """In a simulation that is slower or faster than the clock of receipt."""
+    fed = Fed({"post": {"topic": "/post", "shape": SPHERE}}, begin=START, rate=20)
+    for k in range(400):
+        stamp, now = 10 * SECOND + round(k * STEP * speed), START + k * STEP
+        fed.give("/tf", now, transforms(stamp, ("map", "base", (stamp / SECOND, 0, 0), (0, 0, 0, 1))))
+        fed.give("/post", now, pose_stamped("base", 0, (0, 0, 0)))
+    assert not fed.refused
+    for step in fed.steps:
+        assert step.states["position"][:, 0] == pytest.approx(step.stamp_ns / SECOND, abs=1e-6)
+    assert fed.steps[-1].stamp_ns == pytest.approx(10 * SECOND + 400 * STEP * speed, abs=2 * STEP * max(speed, 1.0))
+
+
+@pytest.mark.parametrize("speed", [0.02, 0.05, 0.5, 1.0])
+def test_objects_without_stamps_do_not_run_ahead_of_rare_stamps(speed: float) -> None:
+    """A slow simulation: odometry every second by the clock of receipt, and a post without stamps 50 times as often."""
+    fed = Fed({"robot": {"topic": "/odom", "shape": SPHERE}, "post": {"topic": "/post", "shape": SPHERE}}, rate=20)
+    for k in range(2000):
+        stamp, now = 10 * SECOND + round(k * STEP * speed / 2.5), START + k * STEP // 5 * 2
+        if k % 50 == 0:
+            fed.give("/odom", now, odometry("map", stamp, (0, 0, 0), (0, 0, 0, 1), (0, 0, 0), (0, 0, 0)))
+        fed.give("/post", now, pose_stamped("map", 0, (0, 0, 0)))
+    last = 10 * SECOND + round(2000 * STEP * speed / 2.5)
+    assert abs(fed.steps[-1].stamp_ns - last) <= 2 * STEP
+    assert not fed.refused
+    assert (fed.rows["id"] == 1).sum() >= min(38, (last - 10 * SECOND) // STEP)
+
+
 # -- stamps that no clock shows
 
 
