@@ -6,6 +6,7 @@ The times are bounds against hangs, ten times as long as a slow machine needs.
 from __future__ import annotations
 
 import time
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -93,6 +94,47 @@ def test_a_long_chain_of_frames_is_walked_up_to_a_bound(links: int, known: bool)
         assert fed.rows["position"][0, 0] == pytest.approx(0.001 * links)
     else:
         assert f"expected at most {MOST_LINKS_BETWEEN} transforms between 'map' and" in next(iter(fed.refused))
+
+
+def test_new_frames_in_a_full_tree_are_refused_in_little_time_until_others_are_silent() -> None:
+    fed = Fed({"t": {"topic": "/tf", "frame": "f7", "shape": SPHERE}})
+    for k in range(2):
+        links = [("map", f"{k}_{i}", (i, 0, 0), (0, 0, 0, 1)) for i in range(MOST_FRAMES)]
+        assert give(fed, "/tf", START, transforms(START + k, *links)) < SLOW
+    assert fed.feed.scene.refused_by_name["/tf"] == MOST_FRAMES
+    fed.give("/tf", START, transforms(START + 9 * SECOND, ("map", "late", (0, 0, 0), (0, 0, 0, 1))))
+    assert fed.feed.scene.refused_by_name["/tf"] == MOST_FRAMES + 1
+    fed.give("/tf", START, transforms(START + 11 * SECOND, ("map", "f7", (3, 0, 0), (0, 0, 0, 1))))
+    assert fed.rows["position"][:, 0].tolist() == [3.0]
+
+
+@pytest.mark.parametrize("where", ["a pose", "a transform", "a marker", "joints"])
+def test_long_names_are_not_kept(where: str) -> None:
+    """A publisher may send another name with every message."""
+    objects = {"thing": {"topic": "/p", "shape": SPHERE}, "m": {"topic": "/m", "marker": {"ns": "a"}}}
+    played = Played({**ROBOT, "joint_states": "/joint_states"}, objects=objects)
+    played.send("/u", "std_msgs/msg/String", message("std_msgs/msg/String", data=robot_of(2)))
+
+    def send(k: int) -> None:
+        stamp, name = START + k * STEP, f"{k}" + "x" * 100_000
+        if where == "a pose":
+            played.give("/p", stamp, pose_stamped(name, stamp, (0, 0, 0)))
+        elif where == "a transform":
+            played.give("/tf", stamp, transforms(stamp, ("map", name, (0, 0, 0), (0, 0, 0, 1))))
+        elif where == "a marker":
+            each = marker(name, k, 1, (1, 1, 1), (0, 0, 0), frame=name, stamp=stamp)
+            played.give("/m", stamp, markers(each))
+        else:
+            played.joints(stamp, [0.0], names=[name])
+
+    send(0)
+    tracemalloc.start()
+    try:
+        for k in range(1, 100):
+            send(k)
+        assert tracemalloc.get_traced_memory()[0] < 3_500_000  # of 9.9 MB; the lists of 32 publishers of joints stay
+    finally:
+        tracemalloc.stop()
 
 
 def test_a_loop_of_frames_and_frames_that_refer_to_themselves_end() -> None:

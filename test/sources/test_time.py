@@ -152,6 +152,18 @@ def test_late_transforms_take_their_place_in_the_history() -> None:
     assert fed.rows["position"][0, 0] == 1.0
 
 
+def test_one_transform_message_out_of_order_does_not_set_time_back() -> None:
+    """Its frames have different stamps, and none of them confirms another."""
+    frames = {name: {"topic": "/tf", "frame": name, "shape": SPHERE} for name in "ab"}
+    fed = Fed(frames, begin=START, rate=20)
+    for now, k in enumerate([0, 1, 2, 3, 4, 6, 5, 7, 8, 9]):
+        each = [transforms(START + k * STEP + j, ("map", name, (k, j, 0), (0, 0, 0, 1))) for j, name in enumerate("ab")]
+        content = T["tf2_msgs/msg/TFMessage"]([one for _, message in each for one in message.transforms])
+        fed.give("/tf", START + now * STEP, (each[0][0], content))
+    stamps = [step.stamp_ns for step in fed.steps]
+    assert stamps == sorted(stamps)
+
+
 # -- messages without a stamp
 
 
