@@ -117,6 +117,20 @@ def test_a_file_without_statistics_is_compared_with_the_indexes_of_its_chunks(tm
     assert read(path) == rows()
 
 
+@pytest.mark.parametrize("index", [IndexType.ALL, IndexType.NONE, IndexType.CHUNK, IndexType.MESSAGE])
+@pytest.mark.parametrize("gap", [0, 5])
+def test_a_chunk_that_is_there_twice_is_an_error(tmp_path: Path, index: IndexType, gap: int) -> None:
+    """Its messages would be taken twice: without statistics, nothing counts them."""
+    path = mcap(tmp_path / "bag.mcap", rows(), chunk_size=2000, use_statistics=False, index_types=index)
+    whole = mutations.parse(path.read_bytes(), len(MAGIC))
+    begin = next(k for k, each in enumerate(whole) if each.opcode == Opcode.CHUNK)
+    end = next(k for k, each in enumerate(whole) if k > begin and each.opcode != Opcode.MESSAGE_INDEX)
+    copy = whole[begin:end]  # with the index of its messages
+    path.write_bytes(with_summary([*whole[: end + gap], *copy, *whole[end + gap :]]))
+    with pytest.raises(SessionError, match=r"its chunk at byte \d+ is the one at byte \d+ once more"):
+        read(path)
+
+
 def test_statistics_of_a_channel_that_is_lost_with_its_messages(tmp_path: Path) -> None:
     """Two channels of one topic: of the second one, only the number of its messages is left."""
     path = tmp_path / "bag.mcap"

@@ -1,7 +1,7 @@
 """A bag in an MCAP file, read from its records and not by its indexes, which may lack messages or invent them.
 
 What was read is compared with the statistics of the file. A file without them may have indexes of its chunks, which say
-at least how many messages there were.
+at least how many messages there were; and no chunk of it may be there twice.
 """
 
 from __future__ import annotations
@@ -147,9 +147,13 @@ class McapStorage:
             return
         stated = Counter({key: channel.count for key, channel in self._channels.items()})
         left: Counter[int] = Counter()  # messages of the last chunk that no index has named
+        first: dict[bytes, int] = {}  # chunk with these first bytes
         for at, opcode, content in self._reader.glance():
             if opcode == Opcode.CHUNK:
                 left = self._chunks.get(at, Counter())
+                before = first.setdefault(content, at) if left else at
+                if before != at and self._are_equal(before, at):
+                    raise self._damaged(f"its chunk at byte {at} is the one at byte {before} once more", hint="")
             elif opcode == Opcode.MESSAGE_INDEX and len(content) >= _INDEX.size:
                 key, size = _INDEX.unpack_from(content)
                 left[key] -= size // _ENTRY
@@ -165,5 +169,13 @@ class McapStorage:
         if lost := sum(count for key, count in stated.items() if key not in self._channels):
             raise self._damaged(f"its {where} states {lost} messages of channels that are not there")
 
-    def _damaged(self, reason: str) -> SessionError:
-        return SessionError(damaged_bag(self._path, f"{reason}{SALVAGE_HINT}"))
+    def _are_equal(self, a: int, b: int) -> bool:
+        """Whether two chunks hold the same messages."""
+        with self._reader.opened() as file:
+            one, other = (
+                [each for each in self._reader.record_at(file, begin) if isinstance(each, Message)] for begin in (a, b)
+            )
+        return one == other
+
+    def _damaged(self, reason: str, hint: str = SALVAGE_HINT) -> SessionError:
+        return SessionError(damaged_bag(self._path, f"{reason}{hint}"))
