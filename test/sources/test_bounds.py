@@ -16,7 +16,7 @@ import pytest
 from fed import Fed
 from foreign_bag import SECOND, START, STORE, marker, markers, odometry, pose_stamped, transforms
 from foreign_messages import decoder, detection, detections, track, tracked_objects
-from planning_messages import a_scene, an_object, matrix, ready, solid
+from planning_messages import REMOVE, SCENE, a_scene, an_object, attached, matrix, ready, solid
 from played_sources import Played
 from ros_messages import message
 from scipy.optimize import linear_sum_assignment
@@ -350,3 +350,53 @@ def test_the_last_id_of_all_leaves_ids_for_tracks() -> None:
     fed.give("/p", START, odometry("map", START, (0, 0, 0), (0, 0, 0, 1), (0, 0, 0), (0, 0, 0)))
     ids = [change.object_id for change in fed.changes]
     assert len({*ids}) == 4 and max(ids) == 4294967295 and not fed.refused
+
+
+# -- planning scenes
+
+
+BALL = solid(2, 0.1)
+
+
+def test_attached_objects_and_those_that_were_detached_have_a_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A new name with every message, attached, and then left in the world."""
+    monkeypatch.setattr("collision_monitor.sources.robot.planning_scene.MOST_HELD", 5)
+    monkeypatch.setattr("collision_monitor.sources.robot.planning_scene.MOST_OBJECTS", 8)
+    played, _ = ready()
+    links = len(played.objects)
+    for k in range(20):
+        held = attached("hand", an_object(f"o{k}", BALL, frame="hand"))
+        played.send("/scene", SCENE, a_scene(held=[held]))
+        assert len(played.objects) <= links + 5
+    assert any("expected at most 5 attached objects" in text for text in played.refusals)
+    for k in range(30):
+        for operation in (REMOVE, 0):  # the first one detaches what is there
+            name = "" if operation == REMOVE else f"n{k}"
+            each = an_object(name, BALL, frame="hand", operation=operation)
+            played.send("/scene", SCENE, a_scene(held=[attached("hand", each)]))
+    assert len(played.objects) == links + 8 + 1
+    assert any("n28: it was detached, and the world has 8 objects, which is the most" in it for it in played.refusals)
+    assert "arm/n28" in [row.what for row in played.feed.unmonitored]
+
+
+def test_as_many_attached_objects_as_there_may_be_take_little_time() -> None:
+    played, _ = ready()
+    held = [attached("hand", an_object(f"o{k}", BALL, frame="hand")) for k in range(600)]
+    assert cpu(lambda: played.send("/scene", SCENE, a_scene(held=held))) < SLOW
+    assert played.feed.scene.refused_by_name["arm"] == 100
+
+
+def test_an_object_that_could_not_be_used_is_listed_until_a_whole_scene_is_without_it() -> None:
+    played, _ = ready()
+    bad = an_object("bad", solid(2, np.nan))
+    for whole in (a_scene(bad, is_diff=False), a_scene(), a_scene(bad, is_diff=False)):
+        played.send("/scene", SCENE, whole)
+        assert [row.what for row in played.feed.unmonitored if "bad" in row.what] == ["arm/bad"]
+    played.send("/scene", SCENE, a_scene(an_object("good", BALL), is_diff=False))
+    assert not any("bad" in row.what for row in played.feed.unmonitored)
+
+
+def test_a_frame_of_a_megabyte_is_not_kept_with_its_object() -> None:
+    played, _ = ready()
+    played.send("/scene", SCENE, a_scene(an_object("far", BALL, frame="x" * 1_000_000)))
+    assert any("frame_id: expected at most 256 characters" in text for text in played.refusals)
