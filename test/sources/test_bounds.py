@@ -248,6 +248,30 @@ def test_new_objects_beyond_the_allowance_follow_and_are_listed_until_then() -> 
         assert not [row for row in feed.unmonitored if "waits" in row.reason]
 
 
+def test_markers_that_wait_have_a_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("collision_monitor.sources.messages.markers.MOST_TRACKS", 50)
+    fed = Fed({"m": {"topic": "/m", "marker": {"ns": "a"}}}, begin=START, allowance=2)
+    for k in range(20):
+        each = [marker("a", 30 * k + i, 1, (1, 1, 1), (i, 0, 0), frame="map", stamp=START + k) for i in range(30)]
+        fed.give("/m", START, markers(*each))
+    assert any("expected at most 50 objects of one entry, with those that wait" in text for text in fed.refused)
+    for _ in range(40):
+        fed._keep(fed.feed.go_on(START))
+    assert len(fed.changes) == 50 and not fed.feed.is_behind
+
+
+@pytest.mark.parametrize("entry", [{}, {"forget_after": 0.5}])
+def test_markers_that_cannot_be_used_are_listed_until_they_are_gone(entry: dict[str, float]) -> None:
+    """Arrows and texts with a new id each would fill the list, and nothing else would be found in it."""
+    fed = Fed({"m": {"topic": "/m", "marker": {"ns": "a"}, **entry}}, begin=START)
+    for k in range(100):
+        stamp = START + k * STEP
+        arrow = marker("a", k, 0, (1, 1, 1), (0, 0, 0), frame="map", stamp=stamp)
+        arrow.lifetime.nanosec = 0 if entry else 500_000_000
+        fed.give("/m", stamp, markers(arrow))
+    assert [row.what for row in fed.feed.unmonitored] == [f"m_{k}" for k in range(94, 100)]
+
+
 def test_a_large_matrix_is_applied_in_little_time_and_a_larger_one_refused() -> None:
     played, _ = ready()
     names = ["hand", *(f"o{k}" for k in range(1500))]

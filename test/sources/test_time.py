@@ -107,6 +107,21 @@ def test_markers_and_tracks_of_the_time_before_end_in_the_time_after() -> None:
     assert len(gone) == 2  # the track that is not seen any more, and the marker after its lifetime
 
 
+def test_markers_that_wait_when_the_time_goes_back_are_of_the_time_after() -> None:
+    """More new markers in one message than are described at once: the others are shown later."""
+    objects = {"m": {"topic": "/m", "marker": {"ns": "a"}}, "robot": {"topic": "/odom", "shape": SPHERE}}
+    fed = Fed(objects, begin=START, allowance=2)
+    each = [marker("a", i, 1, (1, 1, 1), (i, 0, 0), frame="map", stamp=START + 8 * SECOND) for i in range(8)]
+    fed.give("/odom", START, odometry("map", START + 8 * SECOND, (0, 0, 0), (0, 0, 0, 1), (0, 0, 0), (0, 0, 0)))
+    fed.give("/m", START, markers(*each))
+    for k in range(8):
+        stamp = START + k * STEP
+        fed.give("/odom", START + 1 + k, odometry("map", stamp, (0, 0, 0), (0, 0, 0, 1), (0, 0, 0), (0, 0, 0)))
+    assert len(fed.changes) == 9 and not fed.refused
+    late = [step for step in fed.steps if step.stamp_ns > START + SECOND and (step.states["position"][:, 0] > 3).any()]
+    assert not late
+
+
 @pytest.mark.parametrize("lag", [0.1, 0.4, 0.9])
 def test_two_publishers_of_one_topic_with_different_delays_are_one_time(lag: float) -> None:
     """A slow publisher without delay, and a fast one whose stamps lag behind: time never goes back."""
