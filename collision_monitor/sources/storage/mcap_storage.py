@@ -58,10 +58,11 @@ class McapStorage:
         """Yield the messages of these channels in order of time, those of one time in that of the file."""
         with self._reader.opened() as file:
 
-            def read(begin: int) -> Iterator[StoredMessage]:
+            def read(begin: int) -> Iterator[StoredMessage | None]:
                 for each in self._reader.record_at(file, begin):
-                    if isinstance(each, Message) and each.channel_id in keys and each.log_time <= LATEST:
-                        yield StoredMessage(each.channel_id, each.log_time, each.data)
+                    if isinstance(each, Message) and each.log_time <= LATEST:
+                        wanted = each.channel_id in keys
+                        yield StoredMessage(each.channel_id, each.log_time, each.data) if wanted else None
 
             yield from self._order.merged(read)
 
@@ -72,7 +73,7 @@ class McapStorage:
         """Count the messages of each channel, and note where they are."""
         unknown = 0
         for begin, opcode, records in self._reader.sections():
-            first = LATEST + 1
+            readable = []
             there: Counter[int] = Counter()
             for each in records:
                 if isinstance(each, Message):
@@ -82,13 +83,13 @@ class McapStorage:
                     if channel is not None:
                         channel.count += 1
                         channel.readable += each.log_time <= LATEST
-                    first = min(first, each.log_time)
+                    if each.log_time <= LATEST:
+                        readable.append((each.channel_id, each.log_time))
                 elif isinstance(each, Schema):
                     self._schemas[each.id] = each
                 elif isinstance(each, Channel):
                     self._define(each)
-            if first <= LATEST:
-                self._order.add(begin, first)
+            self._order.add(begin, readable)
             if opcode == Opcode.CHUNK:
                 self._chunks[begin] = there
         if unknown:
