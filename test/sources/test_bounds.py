@@ -173,6 +173,28 @@ def test_two_thousand_mimic_joints_are_followed_in_little_time() -> None:
     assert any("mimic: expected a position up to 1e+18" in text for text in played.refusals)
 
 
+def test_links_of_robots_that_are_gone_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("collision_monitor.sources.robot.robot_source.MOST_IDS", 50)
+    played, name = Played(ROBOT), "l" * 200
+
+    def send(k: int) -> None:
+        text = robot_of(20).replace('"l', f'"{name}_{k}_')
+        played.send("/u", "std_msgs/msg/String", message("std_msgs/msg/String", data=text))
+        played.changes.clear()
+
+    tracemalloc.start()
+    try:
+        for k in range(30):
+            send(k)
+        before, _ = tracemalloc.get_traced_memory()
+        for k in range(30, 90):
+            send(k)
+        assert tracemalloc.get_traced_memory()[0] - before < 150_000  # of 370 kB of names and ids
+    finally:
+        tracemalloc.stop()
+    assert len(played.objects) == len({it.object_id for it in played.objects.values()}) == 20
+
+
 def test_the_mesh_of_many_links_is_loaded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     import collision_monitor.robots.link_shapes as shapes
 
