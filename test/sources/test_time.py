@@ -17,7 +17,7 @@ from played_sources import JOINTS, MILLISECOND, Played
 
 from collision_monitor.errors import InputError
 from collision_monitor.monitor.state.timeline import Progress
-from collision_monitor.sources.ground.source_time import Clock, SourceTime
+from collision_monitor.sources.ground.source_time import MOST_STREAMS, Clock, SourceTime
 
 STEP = 50_000_000
 SPHERE = {"sphere": 1.0}
@@ -132,6 +132,19 @@ def test_two_publishers_of_one_topic_with_different_delays_are_one_time(lag: flo
             restarts += clock.advance("/t", now, now) is Progress.RESTARTS
         restarts += clock.advance("/t", now - round(lag * SECOND), now) is Progress.RESTARTS
     assert restarts <= 1  # before the delay was known
+
+
+def test_publishers_that_are_gone_make_room_for_others() -> None:
+    """Markers with a new id each are streams of their own."""
+    clock = Clock(1.0)
+    for k in range(MOST_STREAMS + 100):
+        clock.advance(("/m", k), START + k, START + k)
+    later = START + 12 * SECOND
+    for k in range(2 * 12):
+        clock.advance("/slow", START + k * SECOND // 2, START + k * SECOND // 2)
+    found = [clock.advance("/odom", later + k * STEP, later + k * STEP) for k in range(20)]
+    found += [clock.advance("/odom", later + k * STEP, later + (20 + k) * STEP) for k in range(5)]
+    assert found.count(Progress.RESTARTS) == 1
 
 
 def test_one_stamp_of_the_future_stops_the_steps_for_half_a_second_only() -> None:

@@ -19,7 +19,8 @@ PATIENCE: Final = 0.5
 """s that a publisher with earlier stamps must go on before its time counts."""
 
 MOST_STREAMS: Final = 20_000
-"""Streams whose last stamps are known: topics, frames of tf, publishers of joints. Further ones prove nothing."""
+"""Streams whose last stamps are known: topics, frames of tf, publishers of joints. Further ones prove nothing, unless
+others are older than MAX_TIME_STEP and make room."""
 
 _NANOSECOND: Final = 1e-9
 _SECOND: Final = 1_000_000_000
@@ -70,6 +71,7 @@ class Clock:
         self._timeline = Timeline()
         self._streams: dict[Hashable, _Stream] = {}
         self._back: int | None = None  # stamp of the last message for which time went back, since it last advanced
+        self._next_look = 0  # ns: no earlier look for old streams while there is no room, because it takes 1 ms
 
     @property
     def has_begun(self) -> bool:
@@ -90,7 +92,7 @@ class Clock:
         """Forget all streams and the time."""
         self._timeline = Timeline()
         self._streams.clear()
-        self._back = None
+        self._back, self._next_look = None, 0
 
     def advance(self, stream: Hashable, stamp: int, received: int) -> Progress:
         """Take a stamp of a stream. RESTARTS: the time begins anew, at this stamp. REFUSED: a jump, to be confirmed."""
@@ -116,6 +118,10 @@ class Clock:
 
     def _note(self, stream: Hashable, known: _Stream | None, stamp: int, received: int) -> None:
         if known is None:
+            if len(self._streams) >= MOST_STREAMS and self.now_ns >= self._next_look:
+                oldest = self.now_ns - round(MAX_TIME_STEP * _SECOND)
+                self._streams = {key: each for key, each in self._streams.items() if each.stamp >= oldest}
+                self._next_look = self.now_ns + _SECOND
             if len(self._streams) < MOST_STREAMS:
                 self._streams[stream] = _Stream(stamp, received)
         elif stamp >= known.stamp:
