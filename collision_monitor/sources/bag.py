@@ -59,6 +59,8 @@ class Bag:
     def messages(self, topics: Iterable[str]) -> Iterator[RawMessage]:
         """Yield the messages of these topics by the time of receipt, those of a split bag file by file.
 
+        In a file whose clock was set back, they come run by run (`time_order.Runs`).
+
         Raises SessionError if some of them cannot be read, or are not there.
         """
         wanted = set(topics)

@@ -16,7 +16,7 @@ from collision_monitor.errors import InputError
 from collision_monitor.monitor.state.timeline import Progress
 from collision_monitor.pipeline.topics import Topic
 from collision_monitor.sources.failures import MOST_KEPT_FAILURES, SourceFailure, source_failure
-from collision_monitor.sources.ground.frames import checked_poses, frame_name
+from collision_monitor.sources.ground.frames import LONGEST_FRAME_NAME, checked_poses, frame_name
 from collision_monitor.sources.ground.mapping import HEADER, Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.silent_topics import SilentTopics
@@ -271,7 +271,10 @@ class Feed:
         poses = checked_poses(content.poses[:MOST_TRANSFORMS])
         if (more := len(content.children) - MOST_TRANSFORMS) > 0:
             scene.refuse(raw.topic, f"expected at most {MOST_TRANSFORMS} transforms in a message, got more", more)
-        for k, name in enumerate(content.children[:MOST_TRANSFORMS]):
+        given_stamps = content.stamps[:MOST_TRANSFORMS]
+        # the newest first, so that of several stamps in one late message none confirms another
+        for k in sorted(range(len(given_stamps)), key=lambda k: -given_stamps[k]):
+            name = content.children[k]
             with scene.guard(raw.topic, name):
                 child, parent, given = frame_name(name), frame_name(content.parents[k]), content.stamps[k]
                 stamp = own.get(given) or self._time.message_stamp(given, raw.received)
@@ -296,14 +299,15 @@ class Feed:
             elif frame is None:
                 text = f"no moving transform to {source.frame!r}; frames known from tf: {scene.frames.some_names}"
                 scene.unmonitored.explain(source.name, raw.topic, text)
-        for stamp, frame in sorted(moved):
-            yield from self._step(raw, content, moved[stamp, frame], ("/tf", frame), stamp)
+        taken = [each for each in sorted(moved, reverse=True) if self._advances(raw, ("/tf", each[1]), each[0])]
+        for stamp, frame in reversed(taken):
+            yield from self._step(raw, content, moved[stamp, frame], stamp)
         if not moved:
             yield from self._changes(raw.received)
 
     def _takes_transform(self, frame: str, stamp: int, raw: RawMessage) -> bool:
         """Whether the stamp of a transform can be used; False after a refusal."""
-        progress = self._time.advance_transforms(frame, stamp, raw.received)
+        progress = self._time.advance_transforms(frame[:LONGEST_FRAME_NAME], stamp, raw.received)
         if progress is Progress.RESTARTS:
             self._restart(stamp)
         elif progress is Progress.REFUSED:
@@ -314,22 +318,24 @@ class Feed:
         given = _given_stamp(content)
         if given is not None:
             stamp = self._time.message_stamp(given, raw.received)
-            yield from self._step(raw, content, sources, _stream(raw.topic, content), stamp)
+            if self._advances(raw, _stream(raw.topic, content), stamp):
+                yield from self._step(raw, content, sources, stamp)
             return
         self._give(raw.topic, content, sources, self._time.now_or(raw.received))
         yield from self._changes(raw.received)  # a message without a stamp, such as a URDF, makes no step
 
-    def _step(
-        self, raw: RawMessage, content: Any, sources: list[Source], stream: Hashable, stamp: MessageStamp
-    ) -> Iterator[Input]:
-        """Give a message to its sources, and yield the inputs that are due with it."""
+    def _advances(self, raw: RawMessage, stream: Hashable, stamp: MessageStamp) -> bool:
+        """Whether the time goes on, or begins anew, with a stamp of a message; False after a refusal."""
         progress = self._time.advance(stream, stamp, raw.received)
         if progress is Progress.RESTARTS:
             self._restart(stamp.ns)
         elif progress is Progress.REFUSED:
             self.scene.refuse(raw.topic, _JUMP)
             self._miss(raw)
-            return
+        return progress is not Progress.REFUSED
+
+    def _step(self, raw: RawMessage, content: Any, sources: list[Source], stamp: MessageStamp) -> Iterator[Input]:
+        """Give a message to its sources, and yield the inputs that are due with it."""
         self._give(raw.topic, content, sources, stamp.ns)
         at = self._time.step_due(raw.topic, stamp.ns)
         if at is not None:
@@ -405,8 +411,8 @@ def _given_stamp(content: Any) -> int | None:
 def _stream(topic: str, content: Any) -> Hashable:
     """Return what has rising stamps: the publishers of a topic have their own frames, joints or markers."""
     if isinstance(content, MarkerArrays):
-        return topic, content.namespaces[0], content.ids[0]
+        return topic, content.namespaces[0][:LONGEST_FRAME_NAME], content.ids[0]
     names = getattr(content, "name", None)
     if isinstance(names, list):  # joint states
-        return topic, names[0] if names else ""
-    return topic, content.header.frame_id
+        return topic, names[0][:LONGEST_FRAME_NAME] if names else ""
+    return topic, content.header.frame_id[:LONGEST_FRAME_NAME]

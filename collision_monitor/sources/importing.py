@@ -167,7 +167,7 @@ def _feed(
             record(Topic.PREDICTIONS, outputs.predictions, outputs.result.stamp_ns)
             for alert in outputs.alerts:
                 record(Topic.ALERTS, alert, outputs.result.stamp_ns)
-            if now - last_status >= STATUS_PERIOD:
+            if not 0 <= now - last_status < STATUS_PERIOD:  # the clock of receipt may go back, too
                 last_status = now
                 record(Topic.STATUS, pipeline.status(), now)
         if progress is not None:

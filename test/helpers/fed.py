@@ -29,9 +29,11 @@ def in_world(rows: Any) -> Any:
 class Fed:
     """Feeds messages (topic, received, (type, message)). steps: the state arrays; changes: the descriptions."""
 
-    def __init__(self, objects: dict[str, Any] | None = None, *, begin: int = 0, **top: Any) -> None:
+    def __init__(
+        self, objects: dict[str, Any] | None = None, *, begin: int = 0, allowance: int | None = None, **top: Any
+    ) -> None:
         content = {"frame": "map", **top, **({} if objects is None else {"objects": objects})}
-        self.feed = Feed(make_mapping(content), decoder())
+        self.feed = Feed(make_mapping(content), decoder(), allowance=allowance)
         self.steps: list[ObjectStateArray] = []
         self.changes: list[Change] = []
         self._bound: set[str] = set()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sqlite3
 import struct
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +19,17 @@ from mcap.opcode import Opcode
 from mcap.writer import CompressionType, IndexType
 from mcap.writer import Writer as McapWriter
 from no_files import POINTER
-from recorded_bags import ODOM, STEP, STILL, mcap, read, rows
+from recorded_bags import ODOM, STEP, STILL, Row, mcap, read, rows
 from rosbags.rosbag2 import StoragePlugin
 
 from collision_monitor.cli.main import main
+from collision_monitor.codec import decode_contacts
 from collision_monitor.errors import SessionError
+from collision_monitor.pipeline.topics import Topic
+from collision_monitor.session import Session
 from collision_monitor.session.mcap.layout import MAGIC
+from collision_monitor.session.replaying.replay import replay
+from collision_monitor.session.replaying.replay_report import Verdict
 from collision_monitor.sources import import_bag
 from collision_monitor.sources.bag import Bag
 from collision_monitor.sources.ground.mapping import make_mapping
@@ -117,6 +123,20 @@ def test_a_file_without_statistics_is_compared_with_the_indexes_of_its_chunks(tm
     assert read(path) == rows()
 
 
+@pytest.mark.parametrize("index", [IndexType.ALL, IndexType.NONE, IndexType.CHUNK, IndexType.MESSAGE])
+@pytest.mark.parametrize("gap", [0, 5])
+def test_a_chunk_that_is_there_twice_is_an_error(tmp_path: Path, index: IndexType, gap: int) -> None:
+    """Its messages would be taken twice: without statistics, nothing counts them."""
+    path = mcap(tmp_path / "bag.mcap", rows(), chunk_size=2000, use_statistics=False, index_types=index)
+    whole = mutations.parse(path.read_bytes(), len(MAGIC))
+    begin = next(k for k, each in enumerate(whole) if each.opcode == Opcode.CHUNK)
+    end = next(k for k, each in enumerate(whole) if k > begin and each.opcode != Opcode.MESSAGE_INDEX)
+    copy = whole[begin:end]  # with the index of its messages
+    path.write_bytes(with_summary([*whole[: end + gap], *copy, *whole[end + gap :]]))
+    with pytest.raises(SessionError, match=r"its chunk at byte \d+ is the one at byte \d+ once more"):
+        read(path)
+
+
 def test_statistics_of_a_channel_that_is_lost_with_its_messages(tmp_path: Path) -> None:
     """Two channels of one topic: of the second one, only the number of its messages is left."""
     path = tmp_path / "bag.mcap"
@@ -185,6 +205,59 @@ def test_messages_come_in_order_of_time_whatever_their_order_in_the_file(tmp_pat
     expected = sorted(given, key=lambda row: row[1])  # equal times keep their order
     assert read(mcap(tmp_path / "a.mcap", given, chunk_size=3000)) == expected
     assert read(mcap(tmp_path / "b.mcap", given, use_chunking=False)) == expected
+
+
+def reset(count: int, back: int, topic: str = ODOM) -> list[Row]:
+    """What a recorder writes that goes by the clock of a simulation: it goes back by so many steps in the middle."""
+    half = rows(count, topic)
+    again = [(topic, time - (back - count) * STEP, data[:-8] + b"a second") for topic, time, data in half]
+    return [*half, *again]
+
+
+@pytest.mark.parametrize("options", [{"chunk_size": 2000}, {"chunk_size": 200_000}, {"use_chunking": False}])
+@pytest.mark.parametrize("back", [60, 100, 140])
+def test_runs_keep_their_order_where_the_clock_of_receipt_was_set_back(
+    tmp_path: Path, back: int, options: dict[str, Any]
+) -> None:
+    """In order of time alone, two runs of a simulation would be mixed."""
+    given = [row for two in zip(reset(100, back), reset(100, back, "/other"), strict=True) for row in two]
+    path = mcap(tmp_path / "a.mcap", given, **options)
+    assert read(path, ODOM, "/other") == given
+    assert read(path, "/other") == [row for row in given if row[0] == "/other"]
+
+
+def test_runs_in_a_table(tmp_path: Path) -> None:
+    given = reset(100, 80)
+    messages = [(topic, time, ("nav_msgs/msg/Odometry", data)) for topic, time, data in given]
+    assert read(write_bag(tmp_path / "bag", messages, storage=StoragePlugin.SQLITE3)) == given
+
+
+def test_parts_that_time_separates_come_in_order_of_time(tmp_path: Path) -> None:
+    """Two files, the second one first; and one topic behind another."""
+    given = rows(300)
+    assert read(mcap(tmp_path / "a.mcap", given[150:] + given[:150], chunk_size=3000)) == given
+    both = given + rows(300, "/other")
+    found = read(mcap(tmp_path / "b.mcap", both, chunk_size=3000), ODOM, "/other")
+    assert found == sorted(both, key=lambda row: row[1])
+
+
+def test_a_simulation_that_was_reset_is_imported_run_by_run(tmp_path: Path) -> None:
+    """Both runs find the contact, and a replay gives the same bytes although the times of its records go back."""
+    wall = {"static": True, "pose": [9, 0, 0], "shape": {"sphere": 1}}
+    objects = {"cart": {"topic": ODOM, "shape": {"sphere": 1}}, "wall": wall}
+    given = [
+        (ODOM, START + k * STEP, odometry("map", START + k * STEP, (k * 0.1, y, 0), *STILL))
+        for y in (0.0, 0.5)
+        for k in range(100)
+    ]
+    target = tmp_path / "a.mcap"
+    mapping = make_mapping({"frame": "map", "rate": 50, "objects": objects})
+    import_bag(write_bag(tmp_path / "bag", given), target, mapping)
+    session = Session(target)
+    answers = [decode_contacts(each.data) for each in session.messages() if each.type == Topic.CONTACTS.message]
+    touching = [each.stamp_ns for each in answers if len(each.contacts)]
+    assert sum(after < before for before, after in pairwise(touching)) == 1
+    assert replay(session).verdict is Verdict.IDENTICAL
 
 
 def test_damage_is_an_error_and_no_smaller_bag(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ The times are bounds against hangs, ten times as long as a slow machine needs.
 from __future__ import annotations
 
 import time
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ import pytest
 from fed import Fed
 from foreign_bag import SECOND, START, STORE, marker, markers, odometry, pose_stamped, transforms
 from foreign_messages import decoder, detection, detections, track, tracked_objects
-from planning_messages import a_scene, an_object, matrix, ready, solid
+from planning_messages import REMOVE, SCENE, a_scene, an_object, attached, matrix, ready, solid
 from played_sources import Played
 from ros_messages import message
 from scipy.optimize import linear_sum_assignment
@@ -95,6 +96,47 @@ def test_a_long_chain_of_frames_is_walked_up_to_a_bound(links: int, known: bool)
         assert f"expected at most {MOST_LINKS_BETWEEN} transforms between 'map' and" in next(iter(fed.refused))
 
 
+def test_new_frames_in_a_full_tree_are_refused_in_little_time_until_others_are_silent() -> None:
+    fed = Fed({"t": {"topic": "/tf", "frame": "f7", "shape": SPHERE}})
+    for k in range(2):
+        links = [("map", f"{k}_{i}", (i, 0, 0), (0, 0, 0, 1)) for i in range(MOST_FRAMES)]
+        assert give(fed, "/tf", START, transforms(START + k, *links)) < SLOW
+    assert fed.feed.scene.refused_by_name["/tf"] == MOST_FRAMES
+    fed.give("/tf", START, transforms(START + 9 * SECOND, ("map", "late", (0, 0, 0), (0, 0, 0, 1))))
+    assert fed.feed.scene.refused_by_name["/tf"] == MOST_FRAMES + 1
+    fed.give("/tf", START, transforms(START + 11 * SECOND, ("map", "f7", (3, 0, 0), (0, 0, 0, 1))))
+    assert fed.rows["position"][:, 0].tolist() == [3.0]
+
+
+@pytest.mark.parametrize("where", ["a pose", "a transform", "a marker", "joints"])
+def test_long_names_are_not_kept(where: str) -> None:
+    """A publisher may send another name with every message."""
+    objects = {"thing": {"topic": "/p", "shape": SPHERE}, "m": {"topic": "/m", "marker": {"ns": "a"}}}
+    played = Played({**ROBOT, "joint_states": "/joint_states"}, objects=objects)
+    played.send("/u", "std_msgs/msg/String", message("std_msgs/msg/String", data=robot_of(2)))
+
+    def send(k: int) -> None:
+        stamp, name = START + k * STEP, f"{k}" + "x" * 100_000
+        if where == "a pose":
+            played.give("/p", stamp, pose_stamped(name, stamp, (0, 0, 0)))
+        elif where == "a transform":
+            played.give("/tf", stamp, transforms(stamp, ("map", name, (0, 0, 0), (0, 0, 0, 1))))
+        elif where == "a marker":
+            each = marker(name, k, 1, (1, 1, 1), (0, 0, 0), frame=name, stamp=stamp)
+            played.give("/m", stamp, markers(each))
+        else:
+            played.joints(stamp, [0.0], names=[name])
+
+    send(0)
+    tracemalloc.start()
+    try:
+        for k in range(1, 100):
+            send(k)
+        assert tracemalloc.get_traced_memory()[0] < 3_500_000  # of 9.9 MB; the lists of 32 publishers of joints stay
+    finally:
+        tracemalloc.stop()
+
+
 def test_a_loop_of_frames_and_frames_that_refer_to_themselves_end() -> None:
     fed = Fed({"thing": {"topic": "/p", "shape": SPHERE}, "frame": {"topic": "/tf", "frame": "a", "shape": SPHERE}})
     fed.give("/tf", START, transforms(START, *((a, b, (0, 0, 0), (0, 0, 0, 1)) for a, b in ("ab", "bc", "ca", "aa"))))
@@ -129,6 +171,28 @@ def test_two_thousand_mimic_joints_are_followed_in_little_time() -> None:
     assert took < SLOW and len(played.objects) == 2000
     played, _ = told(robot_of(40, mimic=True).replace("<mimic ", '<mimic multiplier="1e10" '))
     assert any("mimic: expected a position up to 1e+18" in text for text in played.refusals)
+
+
+def test_links_of_robots_that_are_gone_are_forgotten(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("collision_monitor.sources.robot.robot_source.MOST_IDS", 50)
+    played, name = Played(ROBOT), "l" * 200
+
+    def send(k: int) -> None:
+        text = robot_of(20).replace('"l', f'"{name}_{k}_')
+        played.send("/u", "std_msgs/msg/String", message("std_msgs/msg/String", data=text))
+        played.changes.clear()
+
+    tracemalloc.start()
+    try:
+        for k in range(30):
+            send(k)
+        before, _ = tracemalloc.get_traced_memory()
+        for k in range(30, 90):
+            send(k)
+        assert tracemalloc.get_traced_memory()[0] - before < 150_000  # of 370 kB of names and ids
+    finally:
+        tracemalloc.stop()
+    assert len(played.objects) == len({it.object_id for it in played.objects.values()}) == 20
 
 
 def test_the_mesh_of_many_links_is_loaded_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -204,6 +268,30 @@ def test_new_objects_beyond_the_allowance_follow_and_are_listed_until_then() -> 
         described += 250
         assert not feed.is_behind and len(feed.scene.states) == described
         assert not [row for row in feed.unmonitored if "waits" in row.reason]
+
+
+def test_markers_that_wait_have_a_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("collision_monitor.sources.messages.markers.MOST_TRACKS", 50)
+    fed = Fed({"m": {"topic": "/m", "marker": {"ns": "a"}}}, begin=START, allowance=2)
+    for k in range(20):
+        each = [marker("a", 30 * k + i, 1, (1, 1, 1), (i, 0, 0), frame="map", stamp=START + k) for i in range(30)]
+        fed.give("/m", START, markers(*each))
+    assert any("expected at most 50 objects of one entry, with those that wait" in text for text in fed.refused)
+    for _ in range(40):
+        fed._keep(fed.feed.go_on(START))
+    assert len(fed.changes) == 50 and not fed.feed.is_behind
+
+
+@pytest.mark.parametrize("entry", [{}, {"forget_after": 0.5}])
+def test_markers_that_cannot_be_used_are_listed_until_they_are_gone(entry: dict[str, float]) -> None:
+    """Arrows and texts with a new id each would fill the list, and nothing else would be found in it."""
+    fed = Fed({"m": {"topic": "/m", "marker": {"ns": "a"}, **entry}}, begin=START)
+    for k in range(100):
+        stamp = START + k * STEP
+        arrow = marker("a", k, 0, (1, 1, 1), (0, 0, 0), frame="map", stamp=stamp)
+        arrow.lifetime.nanosec = 0 if entry else 500_000_000
+        fed.give("/m", stamp, markers(arrow))
+    assert [row.what for row in fed.feed.unmonitored] == [f"m_{k}" for k in range(94, 100)]
 
 
 def test_a_large_matrix_is_applied_in_little_time_and_a_larger_one_refused() -> None:
@@ -308,3 +396,53 @@ def test_the_last_id_of_all_leaves_ids_for_tracks() -> None:
     fed.give("/p", START, odometry("map", START, (0, 0, 0), (0, 0, 0, 1), (0, 0, 0), (0, 0, 0)))
     ids = [change.object_id for change in fed.changes]
     assert len({*ids}) == 4 and max(ids) == 4294967295 and not fed.refused
+
+
+# -- planning scenes
+
+
+BALL = solid(2, 0.1)
+
+
+def test_attached_objects_and_those_that_were_detached_have_a_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A new name with every message, attached, and then left in the world."""
+    monkeypatch.setattr("collision_monitor.sources.robot.planning_scene.MOST_HELD", 5)
+    monkeypatch.setattr("collision_monitor.sources.robot.planning_scene.MOST_OBJECTS", 8)
+    played, _ = ready()
+    links = len(played.objects)
+    for k in range(20):
+        held = attached("hand", an_object(f"o{k}", BALL, frame="hand"))
+        played.send("/scene", SCENE, a_scene(held=[held]))
+        assert len(played.objects) <= links + 5
+    assert any("expected at most 5 attached objects" in text for text in played.refusals)
+    for k in range(30):
+        for operation in (REMOVE, 0):  # the first one detaches what is there
+            name = "" if operation == REMOVE else f"n{k}"
+            each = an_object(name, BALL, frame="hand", operation=operation)
+            played.send("/scene", SCENE, a_scene(held=[attached("hand", each)]))
+    assert len(played.objects) == links + 8 + 1
+    assert any("n28: it was detached, and the world has 8 objects, which is the most" in it for it in played.refusals)
+    assert "arm/n28" in [row.what for row in played.feed.unmonitored]
+
+
+def test_as_many_attached_objects_as_there_may_be_take_little_time() -> None:
+    played, _ = ready()
+    held = [attached("hand", an_object(f"o{k}", BALL, frame="hand")) for k in range(600)]
+    assert cpu(lambda: played.send("/scene", SCENE, a_scene(held=held))) < SLOW
+    assert played.feed.scene.refused_by_name["arm"] == 100
+
+
+def test_an_object_that_could_not_be_used_is_listed_until_a_whole_scene_is_without_it() -> None:
+    played, _ = ready()
+    bad = an_object("bad", solid(2, np.nan))
+    for whole in (a_scene(bad, is_diff=False), a_scene(), a_scene(bad, is_diff=False)):
+        played.send("/scene", SCENE, whole)
+        assert [row.what for row in played.feed.unmonitored if "bad" in row.what] == ["arm/bad"]
+    played.send("/scene", SCENE, a_scene(an_object("good", BALL), is_diff=False))
+    assert not any("bad" in row.what for row in played.feed.unmonitored)
+
+
+def test_a_frame_of_a_megabyte_is_not_kept_with_its_object() -> None:
+    played, _ = ready()
+    played.send("/scene", SCENE, a_scene(an_object("far", BALL, frame="x" * 1_000_000)))
+    assert any("frame_id: expected at most 256 characters" in text for text in played.refusals)

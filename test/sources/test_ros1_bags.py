@@ -75,6 +75,17 @@ def test_a_bag_of_ros_1_is_read_like_its_twin_of_ros_2(tmp_path: Path, compressi
     assert done.whole and done.states == {"cart": 40}
 
 
+def test_runs_keep_their_order_where_the_clock_of_receipt_was_set_back(tmp_path: Path) -> None:
+    """rosbag goes by the clock of a simulation, which is reset in the middle."""
+    writer, times = Ros1Writer(tmp_path / "a.bag"), [START + k % 100 * STEP for k in range(200)]
+    with writer:
+        odom = writer.add_connection("/cart/odom", KIND, typestore=noetic())
+        for k, time in enumerate(times):
+            kind, message = odometry("odom", time, (k, 0, 0), (0, 0, 0, 1), (1, 0, 0), (0, 0, 0))
+            writer.write(odom, time, bytes(STORE.cdr_to_ros1(STORE.serialize_cdr(message, kind), kind)))
+    assert [received for _, received, _ in read(tmp_path / "a.bag", "/cart/odom")] == times
+
+
 def test_the_old_type_of_transforms_and_fields_that_only_ros_2_has(tmp_path: Path) -> None:
     store = noetic()
     path = ros1(tmp_path / "a.bag", count=3)

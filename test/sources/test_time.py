@@ -17,7 +17,7 @@ from played_sources import JOINTS, MILLISECOND, Played
 
 from collision_monitor.errors import InputError
 from collision_monitor.monitor.state.timeline import Progress
-from collision_monitor.sources.ground.source_time import Clock, SourceTime
+from collision_monitor.sources.ground.source_time import MOST_STREAMS, Clock, SourceTime
 
 STEP = 50_000_000
 SPHERE = {"sphere": 1.0}
@@ -107,6 +107,21 @@ def test_markers_and_tracks_of_the_time_before_end_in_the_time_after() -> None:
     assert len(gone) == 2  # the track that is not seen any more, and the marker after its lifetime
 
 
+def test_markers_that_wait_when_the_time_goes_back_are_of_the_time_after() -> None:
+    """More new markers in one message than are described at once: the others are shown later."""
+    objects = {"m": {"topic": "/m", "marker": {"ns": "a"}}, "robot": {"topic": "/odom", "shape": SPHERE}}
+    fed = Fed(objects, begin=START, allowance=2)
+    each = [marker("a", i, 1, (1, 1, 1), (i, 0, 0), frame="map", stamp=START + 8 * SECOND) for i in range(8)]
+    fed.give("/odom", START, odometry("map", START + 8 * SECOND, (0, 0, 0), (0, 0, 0, 1), (0, 0, 0), (0, 0, 0)))
+    fed.give("/m", START, markers(*each))
+    for k in range(8):
+        stamp = START + k * STEP
+        fed.give("/odom", START + 1 + k, odometry("map", stamp, (0, 0, 0), (0, 0, 0, 1), (0, 0, 0), (0, 0, 0)))
+    assert len(fed.changes) == 9 and not fed.refused
+    late = [step for step in fed.steps if step.stamp_ns > START + SECOND and (step.states["position"][:, 0] > 3).any()]
+    assert not late
+
+
 @pytest.mark.parametrize("lag", [0.1, 0.4, 0.9])
 def test_two_publishers_of_one_topic_with_different_delays_are_one_time(lag: float) -> None:
     """A slow publisher without delay, and a fast one whose stamps lag behind: time never goes back."""
@@ -117,6 +132,19 @@ def test_two_publishers_of_one_topic_with_different_delays_are_one_time(lag: flo
             restarts += clock.advance("/t", now, now) is Progress.RESTARTS
         restarts += clock.advance("/t", now - round(lag * SECOND), now) is Progress.RESTARTS
     assert restarts <= 1  # before the delay was known
+
+
+def test_publishers_that_are_gone_make_room_for_others() -> None:
+    """Markers with a new id each are streams of their own."""
+    clock = Clock(1.0)
+    for k in range(MOST_STREAMS + 100):
+        clock.advance(("/m", k), START + k, START + k)
+    later = START + 12 * SECOND
+    for k in range(2 * 12):
+        clock.advance("/slow", START + k * SECOND // 2, START + k * SECOND // 2)
+    found = [clock.advance("/odom", later + k * STEP, later + k * STEP) for k in range(20)]
+    found += [clock.advance("/odom", later + k * STEP, later + (20 + k) * STEP) for k in range(5)]
+    assert found.count(Progress.RESTARTS) == 1
 
 
 def test_one_stamp_of_the_future_stops_the_steps_for_half_a_second_only() -> None:
@@ -150,6 +178,18 @@ def test_late_transforms_take_their_place_in_the_history() -> None:
         fed.give("/tf", START, transforms(START + k * SECOND, ("map", "base", (k * k, 0, 0), (0, 0, 0, 1))))
     fed.give("/p", START, pose_stamped("base", START + SECOND, (0, 0, 0)))
     assert fed.rows["position"][0, 0] == 1.0
+
+
+def test_one_transform_message_out_of_order_does_not_set_time_back() -> None:
+    """Its frames have different stamps, and none of them confirms another."""
+    frames = {name: {"topic": "/tf", "frame": name, "shape": SPHERE} for name in "ab"}
+    fed = Fed(frames, begin=START, rate=20)
+    for now, k in enumerate([0, 1, 2, 3, 4, 6, 5, 7, 8, 9]):
+        each = [transforms(START + k * STEP + j, ("map", name, (k, j, 0), (0, 0, 0, 1))) for j, name in enumerate("ab")]
+        content = T["tf2_msgs/msg/TFMessage"]([one for _, message in each for one in message.transforms])
+        fed.give("/tf", START + now * STEP, (each[0][0], content))
+    stamps = [step.stamp_ns for step in fed.steps]
+    assert stamps == sorted(stamps)
 
 
 # -- messages without a stamp
@@ -195,6 +235,35 @@ def test_objects_without_stamps_go_on_when_the_others_are_silent() -> None:
         fed.give("/post", START + k * STEP, pose_stamped("map", 0, (k, 0, 0)))
     assert fed.steps[-1].stamp_ns == 10 * SECOND + 99 * STEP
     assert len(fed.steps) >= 85
+
+
+@pytest.mark.parametrize("speed", [0.05, 0.5, 1.0, 2.0])
+def test_objects_without_stamps_take_the_time_of_tf_if_nothing_else_has_one(speed: float) -> None:
+    """In a simulation that is slower or faster than the clock of receipt."""
+    fed = Fed({"post": {"topic": "/post", "shape": SPHERE}}, begin=START, rate=20)
+    for k in range(400):
+        stamp, now = 10 * SECOND + round(k * STEP * speed), START + k * STEP
+        fed.give("/tf", now, transforms(stamp, ("map", "base", (stamp / SECOND, 0, 0), (0, 0, 0, 1))))
+        fed.give("/post", now, pose_stamped("base", 0, (0, 0, 0)))
+    assert not fed.refused
+    for step in fed.steps:
+        assert step.states["position"][:, 0] == pytest.approx(step.stamp_ns / SECOND, abs=1e-6)
+    assert fed.steps[-1].stamp_ns == pytest.approx(10 * SECOND + 400 * STEP * speed, abs=2 * STEP * max(speed, 1.0))
+
+
+@pytest.mark.parametrize("speed", [0.02, 0.05, 0.5, 1.0])
+def test_objects_without_stamps_do_not_run_ahead_of_rare_stamps(speed: float) -> None:
+    """A slow simulation: odometry every second by the clock of receipt, and a post without stamps 50 times as often."""
+    fed = Fed({"robot": {"topic": "/odom", "shape": SPHERE}, "post": {"topic": "/post", "shape": SPHERE}}, rate=20)
+    for k in range(2000):
+        stamp, now = 10 * SECOND + round(k * STEP * speed / 2.5), START + k * STEP // 5 * 2
+        if k % 50 == 0:
+            fed.give("/odom", now, odometry("map", stamp, (0, 0, 0), (0, 0, 0, 1), (0, 0, 0), (0, 0, 0)))
+        fed.give("/post", now, pose_stamped("map", 0, (0, 0, 0)))
+    last = 10 * SECOND + round(2000 * STEP * speed / 2.5)
+    assert abs(fed.steps[-1].stamp_ns - last) <= 2 * STEP
+    assert not fed.refused
+    assert (fed.rows["id"] == 1).sum() >= min(38, (last - 10 * SECOND) // STEP)
 
 
 # -- stamps that no clock shows

@@ -33,6 +33,9 @@ MOST_FRAMES: Final = 10_000
 MOST_LINKS_BETWEEN: Final = 256
 """Links from a frame to the root of its tree, 0.2 ms each. A robot has 30; tf2 allows 1000."""
 
+LOOK_PERIOD: Final = 100_000_000
+"""ns of stamps between two looks for frames without a sample, while there is no room for new ones."""
+
 LONGEST_FRAME_NAME: Final = 256
 """Characters of a name of a frame."""
 
@@ -151,6 +154,7 @@ class FrameTree:
     def __init__(self, max_age: float) -> None:
         self._links: dict[str, _Link] = {}
         self._max_age = round(max_age / _NANOSECOND)
+        self._next_look = 0  # ns: before that, no frame is without a sample for HISTORY
         self._answers: dict[tuple[str, str, int], FrameMotion | MissingFrame] = {}  # until the tree changes
 
     @property
@@ -197,17 +201,21 @@ class FrameTree:
 
     def _forget_silent(self, now_ns: int) -> bool:
         """Forget the moving frames that have no sample within the history; return whether there were some."""
-        silent = [
-            frame for frame, link in self._links.items() if not link.static and link.stamps[-1] < now_ns - HISTORY
-        ]
+        if now_ns <= self._next_look:  # a look takes a millisecond, and a message may hold 10,000 new frames
+            return False
+        last = {frame: link.stamps[-1] for frame, link in self._links.items() if not link.static}
+        silent = [frame for frame, stamp in last.items() if stamp < now_ns - HISTORY]
         for frame in silent:
-            del self._links[frame]
+            del self._links[frame], last[frame]
+        self._next_look = max(min(last.values(), default=now_ns) + HISTORY, now_ns + LOOK_PERIOD)
         return bool(silent)
 
     def motion(self, target: str, source: str, stamp_ns: int) -> FrameMotion | MissingFrame:
         """Return the motion of `source` in `target` at a stamp, or why it is not known."""
         if target == source:
             return IDENTITY
+        if max(len(target), len(source)) > LONGEST_FRAME_NAME:  # it has no transform, and no answer keeps its name
+            return self._motion(target, source, stamp_ns)
         key = target, source, stamp_ns
         found = self._answers.get(key)
         if found is None:
@@ -239,6 +247,7 @@ class FrameTree:
     def restart(self) -> None:
         """Forget all samples that are not static."""
         self._links = {frame: link for frame, link in self._links.items() if link.static}
+        self._next_look = 0
         self._answers.clear()
 
     def _chain(self, frame: str) -> dict[str, None]:

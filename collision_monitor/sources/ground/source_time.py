@@ -19,7 +19,8 @@ PATIENCE: Final = 0.5
 """s that a publisher with earlier stamps must go on before its time counts."""
 
 MOST_STREAMS: Final = 20_000
-"""Streams whose last stamps are known: topics, frames of tf, publishers of joints. Further ones prove nothing."""
+"""Streams whose last stamps are known: topics, frames of tf, publishers of joints. Further ones prove nothing, unless
+others are older than MAX_TIME_STEP and make room."""
 
 _NANOSECOND: Final = 1e-9
 _SECOND: Final = 1_000_000_000
@@ -70,6 +71,7 @@ class Clock:
         self._timeline = Timeline()
         self._streams: dict[Hashable, _Stream] = {}
         self._back: int | None = None  # stamp of the last message for which time went back, since it last advanced
+        self._next_look = 0  # ns: no earlier look for old streams while there is no room, because it takes 1 ms
 
     @property
     def has_begun(self) -> bool:
@@ -90,7 +92,7 @@ class Clock:
         """Forget all streams and the time."""
         self._timeline = Timeline()
         self._streams.clear()
-        self._back = None
+        self._back, self._next_look = None, 0
 
     def advance(self, stream: Hashable, stamp: int, received: int) -> Progress:
         """Take a stamp of a stream. RESTARTS: the time begins anew, at this stamp. REFUSED: a jump, to be confirmed."""
@@ -116,6 +118,10 @@ class Clock:
 
     def _note(self, stream: Hashable, known: _Stream | None, stamp: int, received: int) -> None:
         if known is None:
+            if len(self._streams) >= MOST_STREAMS and self.now_ns >= self._next_look:
+                oldest = self.now_ns - round(MAX_TIME_STEP * _SECOND)
+                self._streams = {key: each for key, each in self._streams.items() if each.stamp >= oldest}
+                self._next_look = self.now_ns + _SECOND
             if len(self._streams) < MOST_STREAMS:
                 self._streams[stream] = _Stream(stamp, received)
         elif stamp >= known.stamp:
@@ -124,6 +130,49 @@ class Clock:
     def _restart(self, stream: Hashable, stamp: int, received: int) -> None:
         self.begin(stamp)
         self._streams[stream] = _Stream(stamp, received)
+
+
+class _Others:
+    """The time of the messages with stamps, for those without: it goes on as it did by the clock of receipt.
+
+    latest: the latest stamp, ns; None before the first. A simulation may be slower than the clock of receipt, which is
+    measured whenever PATIENCE is over. A faster one counts as equally fast, because its next stamp is soon there.
+    """
+
+    __slots__ = ("_advanced", "_heard", "_pace", "_since", "latest")
+
+    def __init__(self) -> None:
+        self.forget()
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self.latest: int | None = None
+        self._pace = 1.0  # of the stamps, by the clock of receipt
+        self._heard = self._advanced = 0  # receipt of the last message, and of that with the latest stamp, ns
+        self._since = 0, 0  # stamp and receipt from which the pace is measured
+
+    def note(self, stamp: int, received: int) -> None:
+        """Take the stamp of a message."""
+        began = self.latest is None or received < self._since[1]
+        self._heard = received
+        if self.latest is not None and stamp <= self.latest:
+            return
+        self.latest, self._advanced = stamp, received
+        elapsed = received - self._since[1]
+        if began:
+            self._since = stamp, received
+        elif elapsed >= PATIENCE * _SECOND:
+            self._pace = min((stamp - self._since[0]) / elapsed, 1.0)
+            self._since = stamp, received
+
+    def at(self, received: int) -> int:
+        """Return their time at a time of receipt."""
+        assert self.latest is not None
+        return min(self.latest + round(self._pace * max(received - self._advanced, 0)), _END - 1)
+
+    def are_silent(self, received: int) -> bool:
+        """Whether the last one is longer ago than PATIENCE, or none came."""
+        return self.latest is None or not 0 <= received - self._heard <= PATIENCE * _SECOND
 
 
 class MessageStamp(NamedTuple):
@@ -147,8 +196,8 @@ class SourceTime:
         self._rate, self._step_topic = rate, step_topic
         self._messages = Clock(max_age)
         self._transforms = Clock(max_age)  # tf is ahead of the other topics, or behind them, and makes no steps
-        self._advanced = 0  # when the latest time last advanced, ns of receipt
-        self._stamped: int | None = None  # when it last advanced with a stamp of a message
+        self._others = _Others()  # the messages with stamps
+        self._other_transforms = _Others()  # what counts while no other message has a stamp
         self._is_stamped = not by_header  # whether the time is one of stamps, not of receipt for lack of stamps
         self._tick: int | None = None  # the number of the last step at a rate
         self._last_step: int | None = None  # its stamp, or that of the last one with a topic
@@ -201,10 +250,9 @@ class SourceTime:
         stamp = self.stamp_of(given, 0)
         if stamp:
             return MessageStamp(stamp, True, True)
-        if self._by_header and self._is_stamped:
-            elapsed = max(received - self._advanced, 0) if self.has_begun else 0
-            silent = self._stamped is None or received - self._stamped > PATIENCE * _SECOND
-            return MessageStamp(min(self.now_or(received) + elapsed, _END - 1), silent, False)
+        known = next((it for it in (self._others, self._other_transforms) if it.latest is not None), None)
+        if self._by_header and known is not None:
+            return MessageStamp(known.at(received), self._others.are_silent(received), False)
         if not 0 <= received < _END:
             raise InputError(f"time of receipt: expected one from 1970 to 2038, got {received * _NANOSECOND:.9f} s")
         return MessageStamp(received, True, not self._by_header)
@@ -213,18 +261,19 @@ class SourceTime:
         """Take the stamp of a message. RESTARTS: forget all earlier times."""
         if not stamp.advances:
             return Progress.CONTINUES
-        before, has_begun = self.now_ns, self.has_begun
         if stamp.is_own and self._leaves_receipt(stamp.ns):
             self._messages.begin(stamp.ns)
             progress = Progress.RESTARTS
         else:
             progress = self._messages.advance(stream, stamp.ns, received)
-        if progress is Progress.RESTARTS or self.now_ns != before or not has_begun:
-            self._advanced = received
-            self._stamped = received if stamp.is_own else self._stamped
         if progress is Progress.RESTARTS:
             self._transforms.forget()
-            return self._restarted()
+            self._restarted()
+            if stamp.is_own:
+                self._others.forget()
+                self._other_transforms.forget()
+        if stamp.is_own and progress is not Progress.REFUSED:
+            self._others.note(stamp.ns, received)
         return progress
 
     def advance_transforms(self, frame: str, stamp: int, received: int) -> Progress:
@@ -232,21 +281,23 @@ class SourceTime:
         progress = self._transforms.advance(frame, stamp, received)
         if self._leaves_receipt(stamp):
             progress = Progress.RESTARTS
-        if progress is not Progress.RESTARTS:
-            return progress
-        if self.has_begun:
-            self._messages.begin(stamp)
-            self._advanced = received
-        return self._restarted()
+        if progress is Progress.RESTARTS:
+            if self.has_begun:
+                self._messages.begin(stamp)
+            self._others.forget()
+            self._other_transforms.forget()
+            self._restarted()
+        if progress is not Progress.REFUSED:
+            self._other_transforms.note(stamp, received)
+        return progress
 
     def _leaves_receipt(self, stamp: int) -> bool:
         """Take the first stamp; return whether the time so far was the clock of receipt, and another one."""
         was_stamped, self._is_stamped = self._is_stamped, True
         return not was_stamped and self.has_begun and abs(stamp - self.now_ns) > MAX_TIME_STEP * _SECOND
 
-    def _restarted(self) -> Progress:
+    def _restarted(self) -> None:
         self._tick = self._last_step = None
-        return Progress.RESTARTS
 
     # -- steps
 

@@ -23,7 +23,7 @@ from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.ground.yaml_table import known
-from collision_monitor.sources.messages.laser_scans import SCAN, BeamMemory, read_beams
+from collision_monitor.sources.messages.laser_scans import MOST_HELD, SCAN, BeamMemory, read_beams
 from collision_monitor.tolerances import LARGEST_INPUT
 
 __all__ = ["CLOUD", "SCAN", "CloudSource", "read_cloud_points", "thinned"]
@@ -65,7 +65,7 @@ class CloudSource(Source):
         frame = scene.locate(entry.name, frame_name(content.header.frame_id), stamp_ns)
         if frame is None:
             return
-        points, lost = self._cloud(content) if hasattr(content, "point_step") else self._scan(content, frame)
+        points, lost = self._cloud(content) if hasattr(content, "point_step") else self._scan(content, frame, scene)
         scene.points_dropped[entry.name] += lost
         points, radius = thinned(points, entry.voxel, entry.radius)
         if not len(points):  # nothing is there, as far as the scan says
@@ -80,11 +80,19 @@ class CloudSource(Source):
             cloud = Points(points[kept], radius)
         scene.describe(entry.describe(shapes=((cloud, Pose()),), at=at))
 
-    def _scan(self, scan: Any, frame: FrameMotion) -> tuple[Floats, int]:
+    def restart(self, now_ns: int, scene: SourceScene) -> None:
+        """See Source. The scanner may be elsewhere now, and what it saw not be there."""
+        self._memory.restart()
+
+    def _scan(self, scan: Any, frame: FrameMotion, scene: SourceScene) -> tuple[Floats, int]:
         """Return the points of a LaserScan and of its failed beams, and the number of the latter. Raises InputError."""
         beams = read_beams(scan, nan_is_free=self._entry.nan_is_free, nearest=self._entry.min_range)
         used = beams.met & self._within(beams.points)
-        held = self._memory.stays(beams, frame_name(scan.header.frame_id), frame, used)
+        beams = beams._replace(reach=min(beams.reach, self._entry.max_range))
+        held, forgotten = self._memory.stays(beams, frame_name(scan.header.frame_id), frame, used)
+        if forgotten:
+            text = f"expected at most {MOST_HELD} points of beams that failed, got more; the farthest are forgotten"
+            scene.refuse(self.name, text, forgotten)
         return np.concatenate([beams.points[used], held]), int(np.count_nonzero(beams.failed))
 
     def _cloud(self, cloud: Any) -> tuple[Floats, int]:

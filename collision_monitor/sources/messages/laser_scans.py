@@ -25,6 +25,9 @@ Mask = NDArray[np.bool_]
 MOST_BEAMS: Final = 1_000_000
 """Beams of a message. A scanner has 360 to 8,000."""
 
+MOST_HELD: Final = 100_000
+"""Points of beams that failed. A scanner that never sees what is behind it holds 1,000 on a straight way."""
+
 _LARGEST_ANGLE: Final = 8.0 * np.pi
 """rad: of the first beam, and between two; larger ones are no angles."""
 
@@ -36,7 +39,7 @@ behind the first."""
 class Beams(NamedTuple):
     """The N beams of a scan: points (N, 3) in its frame (m); whether something is there; whether nothing is known.
 
-    start, step: rad, the direction of the first beam, and to the next one.
+    start, step: rad, the direction of the first beam, and to the next one. reach: m, how far the scanner sees.
     """
 
     points: Floats
@@ -44,6 +47,7 @@ class Beams(NamedTuple):
     failed: Mask
     start: float
     step: float
+    reach: float
 
     def nearest_to(self, angles: Floats) -> NDArray[np.intp]:
         """Return the row of the beam nearest to each direction; -1 for a direction outside of the scan."""
@@ -80,25 +84,30 @@ def read_beams(scan: Any, *, nan_is_free: bool = False, nearest: float = 0.0) ->
     distance[~met] = 0.0
     angle = start + step * np.arange(len(ranges))
     points = np.column_stack([distance * np.cos(angle), distance * np.sin(angle), 0.0 * angle])
-    return Beams(points, met, failed, start, step)
+    return Beams(points, met, failed, start, step, high)
 
 
 class BeamMemory:
     """What the beams of a scanner met last, in the monitor's frame.
 
     The scanner moves on, and a later scan may have other angles, or another number of beams: a point belongs to the
-    beam nearest to its direction from where the scanner is now. Points in directions that a scan does not have are
-    forgotten.
+    beam nearest to its direction from where the scanner is now. Points in directions that a scan does not have, or
+    beyond its reach, are forgotten: no beam of it would meet them.
     """
 
     def __init__(self) -> None:
         self._frame = ""
         self._points = np.zeros((0, 3))
 
-    def stays(self, beams: Beams, name: str, frame: FrameMotion, used: Mask) -> Floats:
+    def restart(self) -> None:
+        """Forget all points."""
+        self._points = np.zeros((0, 3))
+
+    def stays(self, beams: Beams, name: str, frame: FrameMotion, used: Mask) -> tuple[Floats, int]:
         """Take over what the beams meet; return the points (K, 3), in the scan's frame, of those that failed.
 
-        name: of the scan's frame; another frame is another scanner. used (N,): which points count.
+        name: of the scan's frame; another frame is another scanner. used (N,): which points count. Returned second is
+        the number of points that were forgotten, the farthest ones, because there are too many.
         """
         R = rotation_matrix(frame.quaternion)
         if name != self._frame:
@@ -106,5 +115,10 @@ class BeamMemory:
         held = (self._points - frame.position) @ R
         beam = beams.nearest_to(np.arctan2(held[:, 1], held[:, 0]))
         stays = (beam >= 0) & beams.failed[beam] if len(beams.failed) else beam >= 0
-        self._points = np.concatenate([beams.points[beams.met & used] @ R.T + frame.position, self._points[stays]])
-        return np.asarray(held[stays])
+        distance = np.sqrt((held**2).sum(1))
+        kept = np.flatnonzero(stays & (distance <= beams.reach))
+        forgotten = max(len(kept) - MOST_HELD, 0)
+        if forgotten:
+            kept = kept[np.sort(np.argsort(distance[kept], kind="stable")[:MOST_HELD])]
+        self._points = np.concatenate([beams.points[beams.met & used] @ R.T + frame.position, self._points[kept]])
+        return np.asarray(held[kept]), forgotten

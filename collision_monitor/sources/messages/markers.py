@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, Final
 
 import numpy as np
@@ -19,7 +20,7 @@ from collision_monitor.sources.ground.scene_states import carry_states, empty_st
 from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.ground.track_shapes import with_extent
-from collision_monitor.sources.ground.tracks import DescribedTrack, TrackTable
+from collision_monitor.sources.ground.tracks import MOST_TRACKS, DescribedTrack, TrackTable
 from collision_monitor.sources.messages.marker_arrays import ADD, DELETE, MARKER, MARKERS, MarkerArrays
 
 __all__ = ["MARKER", "MARKERS", "MarkerSource", "marker_shape"]
@@ -58,6 +59,8 @@ class MarkerSource(Source):
         forget_after = entry.forget_after if "forget_after" in entry.given else math.inf
         self._tracks = TrackTable(entry.name, forget_after)
         self._waiting: dict[int, tuple[MarkerArrays, int, int]] = {}  # by id: message, row and stamp, to be described
+        self._unusable: dict[int, tuple[int, float]] = {}  # by id: stamp, and ns until it is gone; they are listed
+        self._forget_after = forget_after * 1e9
 
     def take(self, topic: str, content: MarkerArrays, stamp_ns: int, scene: SourceScene) -> None:
         """See Source. A marker is described when it appears."""
@@ -76,6 +79,7 @@ class MarkerSource(Source):
                 if key not in shown:
                     self._tracks.drop(key, scene)
             self._waiting.clear()
+            self._unusable.clear()
             scene.unmonitored.drop(self.name, f"{self.name}_")
         self._show(content, list(shown.values()), stamp_ns, scene)
 
@@ -91,15 +95,24 @@ class MarkerSource(Source):
             for (which, stamp), rows in by_message.items():
                 self._show(contents[which], rows, stamp, scene)
         self._tracks.expire(now_ns, scene)
+        for number in [number for number, (seen, life) in self._unusable.items() if now_ns - seen > life]:
+            del self._unusable[number]
+            scene.has(self.name, self._marker_name(number))  # what is gone is not missing
 
     def restart(self, now_ns: int, scene: SourceScene) -> None:
         """See Source."""
         self._tracks.restart(now_ns)
-        self._waiting = {number: (content, row, now_ns) for number, (content, row, _) in self._waiting.items()}
+        self._unusable = {number: (now_ns, life) for number, (_, life) in self._unusable.items()}
+        messages = {id(content): content for content, _, _ in self._waiting.values()}
+        unstamped = {key: replace(each, stamps=[0] * len(each.stamps)) for key, each in messages.items()}
+        self._waiting = {
+            number: (unstamped[id(content)], row, now_ns) for number, (content, row, _) in self._waiting.items()
+        }
 
     def _drop(self, number: int, scene: SourceScene) -> None:
         self._tracks.drop(number, scene)
         self._waiting.pop(number, None)
+        self._unusable.pop(number, None)
         scene.has(self.name, self._marker_name(number))
 
     def _show(self, content: MarkerArrays, rows: list[int], stamp_ns: int, scene: SourceScene) -> None:
@@ -158,6 +171,9 @@ class MarkerSource(Source):
             return track
         name = self._marker_name(number)
         if not scene.may_describe:
+            if number not in self._waiting and len(self._waiting) + len(self._tracks) >= MOST_TRACKS:
+                scene.refuse(self.name, f"expected at most {MOST_TRACKS} objects of one entry, with those that wait")
+                return None if before is None else track
             self._waiting[number] = content, row, stamp_ns
             scene.lacks(entry.name, name, "it waits, because a message had too many new markers at once")
             return None if before is None else track
@@ -170,10 +186,14 @@ class MarkerSource(Source):
                 return None
             scene.describe(entry.describe(track.object_id, name, shapes, at=at))
             track.shape = shown
+            self._unusable.pop(number, None)
             scene.has(entry.name, name)
             return track
         if before is None:
             scene.lacks(entry.name, name, scene.last_refusal[entry.name])
+            life = min(max(content.lifetimes[row], 0) or math.inf, self._forget_after)
+            if number in self._unusable or len(self._unusable) < MOST_TRACKS:
+                self._unusable[number] = stamp_ns, life
             return None
         return track  # what it showed before stays, where it is now
 

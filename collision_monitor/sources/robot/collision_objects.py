@@ -13,7 +13,7 @@ import numpy as np
 from collision_monitor.errors import InputError
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Shape
-from collision_monitor.sources.ground.frames import frame_name
+from collision_monitor.sources.ground.frames import LONGEST_FRAME_NAME, frame_name
 from collision_monitor.sources.ground.solid_shapes import mesh_shape, plane_shape, primitive_shapes
 from collision_monitor.sources.ground.tracks import LONGEST_KEY
 
@@ -87,7 +87,7 @@ def collision_object(message: Any, before: CollisionObject | None = None) -> Col
             raise InputError(f"expected poses of {len(before.shapes)} shapes, got {len(moved)}")
         places = map(_pose, moved) if moved else (place for _, place in before.shapes)
         shapes = tuple((shape, place) for (shape, _), place in zip(before.shapes, places, strict=True))
-        return CollisionObject(before.name, shapes, frame_name(message.header.frame_id), _pose(message.pose))
+        return CollisionObject(before.name, shapes, _frame(message), _pose(message.pose))
     shapes = _solids(message)
     if not shapes:
         raise InputError("expected at least one shape, got none")
@@ -97,7 +97,15 @@ def collision_object(message: Any, before: CollisionObject | None = None) -> Col
         return CollisionObject(before.name, (*before.shapes, *shapes), before.frame, before.pose)
     if len(message.id) > LONGEST_KEY:
         raise InputError(f"id: expected at most {LONGEST_KEY} characters, got {len(message.id)}")
-    return CollisionObject(str(message.id), shapes, frame_name(message.header.frame_id), _pose(message.pose))
+    return CollisionObject(str(message.id), shapes, _frame(message), _pose(message.pose))
+
+
+def _frame(message: Any) -> str:
+    """Return the frame of a CollisionObject. Raises InputError."""
+    name = frame_name(message.header.frame_id)
+    if len(name) > LONGEST_FRAME_NAME:
+        raise InputError(f"frame_id: expected at most {LONGEST_FRAME_NAME} characters, got {len(name)}")
+    return name
 
 
 def with_solids(message: Any) -> Any:

@@ -17,7 +17,7 @@ from collision_monitor.sources.ground.frames import MissingFrame
 from collision_monitor.sources.ground.mapping import Mapping as SourcesFile
 from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.source import Source
-from collision_monitor.sources.ground.source_scene import SourceScene
+from collision_monitor.sources.ground.source_scene import LONGEST_TEXT, SourceScene
 from collision_monitor.sources.robot.carried_bodies import Body
 from collision_monitor.sources.robot.collision_objects import (
     APPEND,
@@ -37,6 +37,9 @@ COLLISION_OBJECT: Final = "moveit_msgs/msg/CollisionObject"
 
 MOST_OBJECTS: Final = 10_000
 """Objects of a planning scene."""
+
+MOST_HELD: Final = 500
+"""Attached objects of a robot, each of which may touch all others of its link, 0.3 s. A gripper holds 10."""
 
 Describe = Callable[[int, str, Parts, Pose], ObjectDescription]
 """Describes a static object: id, name, shapes, pose."""
@@ -92,6 +95,7 @@ class PlanningSceneSource(Source):
         self._held: dict[str, HeldObject] = {}
         self._rules = PlanningRules(name)
         self._ids: dict[tuple[str, int], int] = {}
+        self._unusable: set[str] = set()  # objects that are listed because their messages were refused
         self._is_changed = False
         self._waits = False  # whether an object is not placed yet
 
@@ -114,6 +118,9 @@ class PlanningSceneSource(Source):
         objects = content.world.collision_objects
         named = {str(each.id) for each in objects}
         if not content.is_diff:
+            for name in sorted(self._unusable - named - {str(each.object.id) for each in _attached(content)}):
+                self._unusable.remove(name)
+                scene.has(self.name, f"{self.name}/{name}")
             for name in sorted(self._held.keys() - {str(each.object.id) for each in _attached(content)}):
                 if self._robot is not None and not content.robot_state.is_diff:
                     self._remove(self._held.pop(name).object_id, name, scene)
@@ -140,7 +147,7 @@ class PlanningSceneSource(Source):
                 self._change_held(each, name, stamp_ns, scene, leaves_world=name in stays)
                 continue
             if name not in self._held and name not in self._world:
-                scene.lacks(self.name, f"{self.name}/{name}", scene.last_refusal[self.name])
+                self._lack(name, scene)
 
     def _note_octomap(self, content: Any, scene: SourceScene) -> None:
         what = f"{self.name}: octomap"
@@ -170,7 +177,13 @@ class PlanningSceneSource(Source):
                 self._is_changed = True
             return
         if known is None:
-            scene.lacks(self.name, f"{self.name}/{name}", scene.last_refusal[self.name])
+            self._lack(name, scene)
+
+    def _lack(self, name: str, scene: SourceScene) -> None:
+        """List an object whose message was refused, until another message has it, or a whole scene does not."""
+        scene.lacks(self.name, f"{self.name}/{name}", scene.last_refusal[self.name])
+        if len(self._unusable) < MOST_OBJECTS:
+            self._unusable.add(name[:LONGEST_TEXT])
 
     def _drop(self, name: str, scene: SourceScene) -> None:
         """Remove an object of the world, and what the matrix says about it."""
@@ -204,6 +217,8 @@ class PlanningSceneSource(Source):
         self._check_link(link)
         solids = message.object.primitives, message.object.meshes, message.object.planes
         known, held = self._world.get(name), self._held.get(name)
+        if held is None and len(self._held) >= MOST_HELD:
+            raise InputError(f"expected at most {MOST_HELD} attached objects, got more")
         offset, touch = None, frozenset(map(str, message.touch_links))
         if not any(map(len, solids)) and known is not None:  # an object of the world is picked up
             content = known.content
@@ -246,6 +261,9 @@ class PlanningSceneSource(Source):
                 scene.remove(held.object_id)
                 scene.refuse(self.name, f"{name:.80}: it was detached, and the world has another object of its name")
                 return
+            if len(self._world) >= MOST_OBJECTS:
+                scene.remove(held.object_id)
+                raise InputError(f"it was detached, and the world has {MOST_OBJECTS} objects, which is the most")
             link = self._robot.link_motion(held.link, stamp_ns, scene)
             if link is None or held.offset is None:
                 scene.remove(held.object_id)
@@ -259,7 +277,7 @@ class PlanningSceneSource(Source):
                 held.object_id, CollisionObject(name, held.content.shapes, scene.frame, at)
             )
             return
-        scene.lacks(self.name, f"{self.name}/{name}", scene.last_refusal[self.name])
+        self._lack(name, scene)
 
     def _id(self, name: str, taken: int | None, scene: SourceScene) -> int:
         """Return the id of an object, which it keeps when it is attached or comes again.

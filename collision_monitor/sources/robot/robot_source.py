@@ -39,6 +39,9 @@ MOST_UNKNOWN_JOINTS: Final = 1000
 MOST_DIGESTS: Final = 10_000
 """Bodies whose shapes are known by a digest."""
 
+MOST_IDS: Final = 10_000
+"""Links whose ids are kept, also those that another URDF had. A robot has at most 2,000 with shapes."""
+
 _SHOWN: Final = 8
 
 _STDDEVS: Final = ("position_stddev", "orientation_stddev", "velocity_stddev", "angular_velocity_stddev")
@@ -268,6 +271,8 @@ class RobotSource(Source):
         assert robot is not None
         for link in sorted(self._links.keys() - set(robot.links)):
             self._forget(self._links[link], scene)
+        if len(self._ids) > MOST_IDS:
+            self._ids = {link: object_id for link, object_id in self._ids.items() if link in robot.links}
         for link in robot.links:
             if link not in self._ids:
                 self._ids[link] = scene.new_id()

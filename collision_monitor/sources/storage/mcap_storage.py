@@ -1,7 +1,7 @@
 """A bag in an MCAP file, read from its records and not by its indexes, which may lack messages or invent them.
 
 What was read is compared with the statistics of the file. A file without them may have indexes of its chunks, which say
-at least how many messages there were.
+at least how many messages there were; and no chunk of it may be there twice.
 """
 
 from __future__ import annotations
@@ -58,10 +58,11 @@ class McapStorage:
         """Yield the messages of these channels in order of time, those of one time in that of the file."""
         with self._reader.opened() as file:
 
-            def read(begin: int) -> Iterator[StoredMessage]:
+            def read(begin: int) -> Iterator[StoredMessage | None]:
                 for each in self._reader.record_at(file, begin):
-                    if isinstance(each, Message) and each.channel_id in keys and each.log_time <= LATEST:
-                        yield StoredMessage(each.channel_id, each.log_time, each.data)
+                    if isinstance(each, Message) and each.log_time <= LATEST:
+                        wanted = each.channel_id in keys
+                        yield StoredMessage(each.channel_id, each.log_time, each.data) if wanted else None
 
             yield from self._order.merged(read)
 
@@ -72,7 +73,7 @@ class McapStorage:
         """Count the messages of each channel, and note where they are."""
         unknown = 0
         for begin, opcode, records in self._reader.sections():
-            first = LATEST + 1
+            readable = []
             there: Counter[int] = Counter()
             for each in records:
                 if isinstance(each, Message):
@@ -82,13 +83,13 @@ class McapStorage:
                     if channel is not None:
                         channel.count += 1
                         channel.readable += each.log_time <= LATEST
-                    first = min(first, each.log_time)
+                    if each.log_time <= LATEST:
+                        readable.append((each.channel_id, each.log_time))
                 elif isinstance(each, Schema):
                     self._schemas[each.id] = each
                 elif isinstance(each, Channel):
                     self._define(each)
-            if first <= LATEST:
-                self._order.add(begin, first)
+            self._order.add(begin, readable)
             if opcode == Opcode.CHUNK:
                 self._chunks[begin] = there
         if unknown:
@@ -147,9 +148,13 @@ class McapStorage:
             return
         stated = Counter({key: channel.count for key, channel in self._channels.items()})
         left: Counter[int] = Counter()  # messages of the last chunk that no index has named
+        first: dict[bytes, int] = {}  # chunk with these first bytes
         for at, opcode, content in self._reader.glance():
             if opcode == Opcode.CHUNK:
                 left = self._chunks.get(at, Counter())
+                before = first.setdefault(content, at) if left else at
+                if before != at and self._are_equal(before, at):
+                    raise self._damaged(f"its chunk at byte {at} is the one at byte {before} once more", hint="")
             elif opcode == Opcode.MESSAGE_INDEX and len(content) >= _INDEX.size:
                 key, size = _INDEX.unpack_from(content)
                 left[key] -= size // _ENTRY
@@ -165,5 +170,13 @@ class McapStorage:
         if lost := sum(count for key, count in stated.items() if key not in self._channels):
             raise self._damaged(f"its {where} states {lost} messages of channels that are not there")
 
-    def _damaged(self, reason: str) -> SessionError:
-        return SessionError(damaged_bag(self._path, f"{reason}{SALVAGE_HINT}"))
+    def _are_equal(self, a: int, b: int) -> bool:
+        """Whether two chunks hold the same messages."""
+        with self._reader.opened() as file:
+            one, other = (
+                [each for each in self._reader.record_at(file, begin) if isinstance(each, Message)] for begin in (a, b)
+            )
+        return one == other
+
+    def _damaged(self, reason: str, hint: str = SALVAGE_HINT) -> SessionError:
+        return SessionError(damaged_bag(self._path, f"{reason}{hint}"))

@@ -67,13 +67,12 @@ class Ros1Storage:
         """Yield the messages of these connections in order of time, those of one time in that of the file."""
         with self._open() as file:
 
-            def read(begin: int) -> Iterator[StoredMessage]:
+            def read(begin: int) -> Iterator[StoredMessage | None]:
                 file.seek(begin)
                 for fields, data in self._in_chunk(*_record(file, self._size - begin)):
-                    if fields[b"op"][0] == _MESSAGE and (key := _number(fields[b"conn"])) in keys:
-                        time = _nanoseconds(fields[b"time"])
-                        if time <= LATEST:
-                            yield StoredMessage(key, time, data)
+                    if fields[b"op"][0] == _MESSAGE and (time := _nanoseconds(fields[b"time"])) <= LATEST:
+                        key = _number(fields[b"conn"])
+                        yield StoredMessage(key, time, data) if key in keys else None
 
             yield from self._order.merged(read)
 
@@ -112,20 +111,21 @@ class Ros1Storage:
             raise ValueError(f"its index has messages of {len(unknown)} connections that are not there{_REINDEX}")
 
     def _count(self, begin: int, fields: Fields, data: bytes) -> None:
-        first = LATEST + 1
+        readable = []
         for inner, content in self._in_chunk(fields, data):
             if inner[b"op"][0] == _CONNECTION:
                 self._define(inner, content)
             elif inner[b"op"][0] == _MESSAGE:
-                channel = self._channels.get(_number(inner[b"conn"]))
+                key = _number(inner[b"conn"])
+                channel = self._channels.get(key)
                 if channel is None:
                     raise ValueError(f"a message of a connection that is not there, in the chunk at byte {begin}")
                 time = _nanoseconds(inner[b"time"])
                 channel.count += 1
                 channel.readable += time <= LATEST
-                first = min(first, time)
-        if first <= LATEST:
-            self._order.add(begin, first)
+                if time <= LATEST:
+                    readable.append((key, time))
+        self._order.add(begin, readable)
         self._left -= _number(fields[b"size"])
         if self._left < 0:
             raise ValueError("its chunks unpack to more than its size justifies")

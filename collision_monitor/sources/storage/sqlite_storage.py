@@ -12,6 +12,7 @@ from typing import Any, Final
 from collision_monitor.errors import SessionError
 from collision_monitor.settings.regular_file import open_regular
 from collision_monitor.sources.storage.stored_channel import LATEST, StoredChannel, StoredMessage, damaged_bag
+from collision_monitor.sources.storage.time_order import Runs
 
 SQLITE_MAGIC: Final = b"SQLite format 3\0"
 
@@ -39,6 +40,7 @@ class SqliteStorage:
             self._base.execute("PRAGMA trusted_schema = OFF")
             self._check_tables()
             self.channels = self._read_channels()
+            self._runs = self._read_runs()
         except (sqlite3.Error, TypeError, ValueError, OverflowError) as error:
             self.close()
             raise self._damaged(error) from None
@@ -47,14 +49,15 @@ class SqliteStorage:
             raise
 
     def messages(self, keys: Collection[int]) -> Iterator[StoredMessage]:
-        """Yield the messages of these topics in order of time, those of one time in that of the table."""
+        """Yield the messages of these topics in order of time, those of one time in that of the table, run by run."""
         names = ", ".join(str(channel.key) for channel in self.channels if channel.key in keys)
         try:
-            for key, time, data in self._base.execute(
-                f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({names}) AND {_READABLE} "
-                "ORDER BY timestamp, id"
-            ):
-                yield StoredMessage(key, time, data)
+            for run in self._runs:
+                for key, time, data in self._base.execute(
+                    f"SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({names}) AND {_READABLE} "
+                    f"AND {run} ORDER BY timestamp, id"
+                ):
+                    yield StoredMessage(key, time, data)
         except sqlite3.Error as error:
             raise self._damaged(error) from None
 
@@ -108,6 +111,21 @@ class SqliteStorage:
             lost = sum(count for count, _ in counts.values())
             raise SessionError(damaged_bag(self._path, f"{lost} messages are of topics that it does not define"))
         return channels
+
+    def _read_runs(self) -> list[str]:
+        """Return conditions for the rows of each run (`time_order.Runs`)."""
+        runs, starts = Runs(), []
+        for number, key, time in self._base.execute(
+            f"SELECT id, topic_id, timestamp FROM messages WHERE {_READABLE} ORDER BY id"
+        ):
+            if not isinstance(number, int):
+                return ["TRUE"]
+            if runs.begins(key, time):
+                starts.append(number)
+        if not runs.numbers().any():
+            return ["TRUE"]
+        ends = [f"id < {end}" for end in starts[1:]] + ["TRUE"]
+        return [f"id >= {start} AND {end}" for start, end in zip(starts, ends, strict=True)]
 
     def _columns(self, table: str) -> set[str]:
         return {row[1] for row in self._base.execute(f"PRAGMA table_info({table})")}

@@ -149,6 +149,42 @@ def test_beams_of_other_angles_that_fail_keep_what_was_met_in_their_direction(la
     assert fed.names[-1].startswith("-")  # the scanner looks elsewhere
 
 
+BLOCKED = [INF, 2, 0, 2]
+"""A scanner that sees to its left and right, nothing in front, and whose robot hides what is behind."""
+
+
+def drive(fed: Fed, steps: int, *, first: int = 0) -> Any:
+    """Drive straight on, 3 m at a time, and return the places of the points along the way at the end, in m."""
+    for k in range(first, first + steps):
+        fed.give("/tf", at(k), transforms(at(k), ("map", "laser", (3 * k, 0, 0), (0, 0, 0, 1))))
+        kind, content = laser_scan("laser", at(k), BLOCKED, start=0.0, step=math.pi / 2)
+        fed.give("/scan", at(k), (kind, content))
+    return sorted(np.round(points_of(fed)[:, 0]).tolist())
+
+
+@pytest.mark.parametrize(("entry", "behind"), [({}, [0, 3, 6, 9]), ({"max_range": 5.0}, [0, 3])])
+def test_what_a_robot_leaves_behind_is_held_as_far_as_its_scanner_sees(entry: Any, behind: list[float]) -> None:
+    """It would grow for ever on a straight way, where the beams to the rear never measure."""
+    fed = Fed({"scan": {"topic": "/scan", **entry}})
+    points = drive(fed, 200)
+    assert points == sorted([597.0 - each for each in behind] * 2)
+    assert not fed.refused
+
+
+def test_too_many_points_of_failed_beams_are_the_farthest_and_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    fed = Fed({"scan": {"topic": "/scan"}}, begin=START)
+    monkeypatch.setattr("collision_monitor.sources.messages.laser_scans.MOST_HELD", 2)
+    assert drive(fed, 20) == [54.0, 54.0, 57.0, 57.0]
+    assert "scan: expected at most 100000 points of beams that failed" in next(iter(fed.refused))
+    assert [row.line for row in fed.feed.unmonitored] == ["scan"]
+
+
+def test_what_was_met_before_the_time_went_back_is_not_held_after_it() -> None:
+    fed = Fed({"scan": {"topic": "/scan"}})
+    drive(fed, 100, first=2)
+    assert drive(fed, 4) == [3.0, 3.0, 6.0, 6.0, 9.0, 9.0]  # the first message alone does not set the time back
+
+
 def test_what_is_nearer_than_the_file_allows_hides_what_is_behind_it() -> None:
     """Dirt before the scanner does not make the wall behind it free."""
     fed = Fed({"scan": {"topic": "/scan", "min_range": 0.6}})
