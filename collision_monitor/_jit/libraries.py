@@ -9,13 +9,15 @@ An outlined function is the opposite: its machine code is made once, and the ker
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import llvmlite.binding as llvm
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase, DefaultPassBuilder
+from numba.core.funcdesc import default_mangler
 
 from collision_monitor._jit.cache import folder
 
@@ -121,7 +123,33 @@ class OutlinedLibrary(_WithoutEntry):
         return library
 
 
-class KernelCompiler(CompilerBase):  # type: ignore[misc]
+LONGEST_SYMBOL: Final = 160
+"""Characters of a symbol, behind which a digest stands for the types of the arguments."""
+
+
+def _short_mangler(name: str, types: Any, *, abi_tags: Any = (), uid: Any = None) -> str:
+    """The symbol of a function. numba spells the types of all members of a named tuple, the bodies' in 3,300 characters.
+
+    Each kernel repeats that for each function inside, in machine code, intermediate code and texts of errors: three
+    quarters of the bytes of all kernels.
+    """
+    whole: str = default_mangler(name, types, abi_tags=abi_tags, uid=uid)
+    if len(whole) <= LONGEST_SYMBOL:
+        return whole
+    digest = hashlib.blake2b(whole.encode(), digest_size=12).hexdigest()
+    short: str = default_mangler(name, (), abi_tags=(*abi_tags, digest), uid=uid)
+    return short
+
+
+class _ShortSymbols(CompilerBase):  # type: ignore[misc]
+    """Numba's compiler with short symbols."""
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self.state.targetctx.mangler = _short_mangler  # of a copy that this compilation has for itself
+
+
+class KernelCompiler(_ShortSymbols):
     """Numba's compiler, which writes into a WholeLibrary."""
 
     def define_pipelines(self) -> list[Any]:
@@ -132,7 +160,7 @@ class KernelCompiler(CompilerBase):  # type: ignore[misc]
         return [DefaultPassBuilder.define_nopython_pipeline(state)]
 
 
-class DeviceCompiler(CompilerBase):  # type: ignore[misc]
+class DeviceCompiler(_ShortSymbols):
     """Numba's compiler, which writes into a DeviceLibrary."""
 
     def define_pipelines(self) -> list[Any]:
@@ -142,7 +170,7 @@ class DeviceCompiler(CompilerBase):  # type: ignore[misc]
         return [DefaultPassBuilder.define_nopython_pipeline(state)]
 
 
-class OutlinedCompiler(CompilerBase):  # type: ignore[misc]
+class OutlinedCompiler(_ShortSymbols):
     """Numba's compiler, which writes into an OutlinedLibrary."""
 
     def define_pipelines(self) -> list[Any]:

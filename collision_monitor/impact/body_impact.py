@@ -347,7 +347,7 @@ def body_impact(
     return queries
 
 
-@outlined
+@device
 def _set_piece_at(bodies: Any, i: int, t: float, piece: Any) -> None:
     """Write the piece of body i's plan that holds from time t on into `piece` (MOTION), with the body's tube."""
     m = bodies.motion[i]

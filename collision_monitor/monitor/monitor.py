@@ -274,14 +274,13 @@ class Monitor(Stages):
         if outside is not None:
             active.end_of(outside)
         moved, ending = self._tracking.find(step, self._uncertain)
-        replanned, lasting = (self._tracking.inside(slots) for slots in self._plans.find(step))
+        replanned, lasting = self._plans.renew(step, self._tracking.inside, candidates.grid)
         step.work.objects_moved += len(replanned)
         ending = np.concatenate([ending, lasting])
         which = np.concatenate([moved, replanned, ending])
         if len(which) == 0:
             return NO_EVENTS
         self._tracking.restart(step, moved, ending, self._uncertain, candidates.grid)
-        self._plans.restart(step, replanned, candidates.grid)
         pairs = candidates.find(step, which)
         pairs = leave_out_crowds(step, pairs, active, events, candidates, self._refusals)
         self._uncertain.add_pairs(step, pairs)

@@ -7,6 +7,7 @@ more than its tolerance is predicted from its last state from then on.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import inf, sqrt
 from typing import Any, Final
 
@@ -33,8 +34,9 @@ from collision_monitor.motion.motion import (
     swept_box,
     twist_at,
 )
-from collision_monitor.motion.stated_motion import COURSE, REST
+from collision_monitor.motion.stated_motion import ACCELERATION, ANGULAR, COURSE, LINEAR, REST
 from collision_monitor.motion.trajectory import Tolerance, Trajectory
+from collision_monitor.shapes.pose import rotation_matrix
 
 PLAN: Final = np.dtype(
     [
@@ -112,7 +114,7 @@ class Plans(Stage):
         self.drop(roster, np.array([i], np.int32))
         count, start = len(plan.numbers), zero or 0.0
         first = self._place(roster, count)
-        write_pieces(self._pieces, first, plan.numbers, plan.begins + start, plan.times[0] + start)
+        _write_pieces(self._pieces[first : first + count], first, plan, start)
         row = np.zeros(1, PLAN)
         row["tube"], row["ends"] = plan.tubes.max(), plan.times[-1] + start
         row["slot"], row["first"], row["count"] = i, first, count
@@ -182,21 +184,19 @@ class Plans(Stage):
             row["ends"] += zero
             row["waits"] = False
 
-    def find(self, step: StepContext) -> tuple[Slots, Slots]:
-        """Slots of the bodies with plans to predict anew, and of those to predict further; see `Tracking.find`."""
+    def renew(self, step: StepContext, inside: Callable[[Slots], Slots], grid: HashedGrid) -> tuple[Slots, Slots]:
+        """Make plans the reference motions of the bodies to predict anew, and update their boxes in the grid.
+
+        inside: leaves out the slots of bodies outside of the region. Returns the slots of those bodies, and of those
+        to predict further; see `Tracking.find`.
+        """
         if not len(self._rows):
             return NOBODY, NOBODY
-        found = np.empty((2, len(self._rows)), np.int32)
-        n, m = find_moved_of_plans(step.roster.bodies, self._rows, step.now, step.horizons, step.settings.motion, found)
+        found, rows = np.empty((2, len(self._rows)), np.int32), self._rows
+        which = np.flatnonzero(np.isin(rows["slot"], inside(self.slots)))
+        seconds, settings = (step.now, step.horizons), step.settings.motion
+        n, m = renew_plans(step.roster.bodies, rows, which, grid, seconds, settings, found)
         return found[0, :n], found[1, :m]
-
-    def restart(self, step: StepContext, moved: Slots, grid: HashedGrid) -> None:
-        """Make the plans of bodies their reference motions. Update their boxes in the grid."""
-        if not len(moved):
-            return
-        which = np.isin(self._rows["slot"], moved)
-        restart_plans(step.roster.bodies, self._rows[which], grid, step.now, step.horizons, step.settings.motion)
-        self._rows["fresh"][which] = False
 
     # ------------------------------------------------------------------ snapshots
 
@@ -257,24 +257,17 @@ def _move(rows: Any, pieces: Any, kept: Any, motion: Any) -> int:
     return at
 
 
-@allocating_kernel
-def write_pieces(pieces: Any, first: int, numbers: Any, begins: Any, starts: float) -> None:
-    """Write a plan of motions (M, NUMBERS) from some times (M,) on into pieces[first : first + M].
-
-    starts: when the second one begins; the first one stands until then.
-    """
-    last = len(numbers) - 1
-    for k in range(len(numbers)):
-        m = pieces[first + k]
-        m.x, m.y, m.z = numbers[k, 0], numbers[k, 1], numbers[k, 2]
-        m.vx, m.vy, m.vz = numbers[k, 7], numbers[k, 8], numbers[k, 9]
-        m.wx, m.wy, m.wz = numbers[k, 10], numbers[k, 11], numbers[k, 12]
-        m.ax, m.ay, m.az = numbers[k, 13], numbers[k, 14], numbers[k, 15]
-        quaternion_to_matrix(numbers[:, 3:7], k, m.rotation)
-        m.time = starts if k == 0 else begins[k]
-        m.course, m.rest = int(numbers[k, COURSE]), m.time + numbers[k, REST]
-        m.until = inf if k == last else begins[k + 1]
-        m.piece = first + k
+def _write_pieces(pieces: Any, first: int, plan: Trajectory, start: float) -> None:
+    """Write a plan whose time 0 is `start` (s) into pieces (M,) MOTION, the first of which has the index `first`."""
+    for c, axis in enumerate("xyz"):
+        pieces[axis], pieces[f"v{axis}"] = plan.numbers[:, c], plan.numbers[:, LINEAR + c]
+        pieces[f"w{axis}"], pieces[f"a{axis}"] = plan.numbers[:, ANGULAR + c], plan.numbers[:, ACCELERATION + c]
+    pieces["rotation"] = rotation_matrix(plan.numbers[:, 3:LINEAR])
+    pieces["time"] = plan.begins + start
+    pieces["time"][0] = plan.times[0] + start  # it stands until then
+    pieces["course"], pieces["rest"] = plan.numbers[:, COURSE], pieces["time"] + plan.numbers[:, REST]
+    pieces["until"][:-1], pieces["until"][-1] = plan.begins[1:] + start, inf
+    pieces["piece"] = first + np.arange(len(pieces))
 
 
 @inlined
@@ -347,12 +340,17 @@ def _narrow_tube(bodies: Any, i: int, settings: Any) -> tuple[float, float]:
 
 
 @allocating_kernel
-def find_moved_of_plans(
-    bodies: Any, rows: Any, now: float, horizons: Any, settings: Any, found: Any
+def renew_plans(
+    bodies: Any, rows: Any, which: Any, grid: HashedGrid, seconds: Any, settings: Any, found: Any
 ) -> tuple[int, int]:
-    """`find_moved` of the bodies that follow the plans rows (P,): slots to found (2, P); returns both numbers."""
+    """`find_moved` and `restart_motion` of the bodies that follow the plans rows[which], with their plans as motions.
+
+    Writes the slots of those that were predicted anew to found[0], and of those that end too soon to found[1]; returns
+    both numbers. seconds: now, and the horizon of each body (N,).
+    """
+    now, horizons = seconds
     n = n_ending = 0
-    for k in range(len(rows)):
+    for k in which:
         row = rows[k]
         i = row.slot
         if not bodies.seen[i]:
@@ -367,6 +365,15 @@ def find_moved_of_plans(
         if row.fresh or is_off or is_wide:
             if bodies.slack[i] > 0.0:  # 0: the body is new
                 bodies.slack[i] = max(0.5 * bodies.slack[i], SHORTEST_SLACK * horizon)
+            set_piece(_piece_at(bodies, row, now), m)
+            row.fresh = False
+            bodies.version[i] += np.uint32(1)
+            m.tube_time, m.covered = now, -inf
+            m.tube_0 = max(needed[0], ROOM * row.lately) + 2.0 * drift * age
+            m.tube_1 = needed[1] + 2.0 * drift
+            m.spread_0 = m.spread_1 = 0.0
+            set_cover(bodies, i, now, horizon)
+            put_box(grid, i, swept_box(bodies, i, now, settings.margin))
             found[0, n] = i
             n += 1
         elif m.cover < now + horizon:
@@ -374,22 +381,3 @@ def find_moved_of_plans(
             found[1, n_ending] = i
             n_ending += 1
     return n, n_ending
-
-
-@allocating_kernel
-def restart_plans(bodies: Any, rows: Any, grid: HashedGrid, now: float, horizons: Any, settings: Any) -> None:
-    """`restart_motion` of the bodies that follow the plans rows (P,): their reference motions are those plans."""
-    for k in range(len(rows)):
-        row = rows[k]
-        i = row.slot
-        m = bodies.motion[i]
-        set_piece(_piece_at(bodies, row, now), m)
-        bodies.version[i] += np.uint32(1)
-        age = now - bodies.time[i]
-        needed = _narrow_tube(bodies, i, settings)
-        m.tube_time, m.covered = now, -inf
-        drift = 2.0 * settings.stale_acceleration * age
-        m.tube_0, m.tube_1 = max(needed[0], ROOM * row.lately) + drift * age, needed[1] + drift
-        m.spread_0 = m.spread_1 = 0.0
-        set_cover(bodies, i, now, horizons[i])
-        put_box(grid, i, swept_box(bodies, i, now, settings.margin))

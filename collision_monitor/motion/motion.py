@@ -81,7 +81,7 @@ def quaternion_to_matrix(q: Any, i: int, out: Any) -> None:
     out[2, 2] = 1.0 - 2.0 * (x * x + y * y)
 
 
-@outlined
+@device
 def set_piece(piece: Any, m: Any) -> None:
     """Let the motion m (MOTION) go on as a piece of a plan does. Its radius, its tube and its cover stay."""
     m.x, m.y, m.z = piece.x, piece.y, piece.z
@@ -336,7 +336,7 @@ def _swept(m: Any, begin: float, sweep: float, half: float) -> Region:
     )  # fmt: skip
 
 
-@outlined
+@device
 def _swept_along_plan(bodies: Any, m: Any, begin: float, end: float, half: float) -> Region:
     """`swept_box` of a body that follows a plan, of which m is the piece that holds first: that of all its pieces."""
     box, k = _swept(m, begin, max(m.until - begin, 0.0), half), m.piece
