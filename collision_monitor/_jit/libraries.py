@@ -128,7 +128,7 @@ LONGEST_SYMBOL: Final = 160
 
 
 def _short_mangler(name: str, types: Any, *, abi_tags: Any = (), uid: Any = None) -> str:
-    """The symbol of a function. numba spells the types of all members of a named tuple, the bodies' in 3,300 characters.
+    """The symbol of a function. numba spells the types of all members of a tuple, those of the bodies in 3,300 letters.
 
     Each kernel repeats that for each function inside, in machine code, intermediate code and texts of errors: three
     quarters of the bytes of all kernels.
