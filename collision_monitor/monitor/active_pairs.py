@@ -375,5 +375,5 @@ def _can_wait(bodies: Any, event: Any, now: float, period: float) -> bool:
 @inlined
 def is_predicted_anew(bodies: Any, i: int, j: int, now: float, event: Any) -> bool:
     """Whether this step predicted the pair anew already, because a body left the motion that the event rests on."""
-    is_new = bodies.motion[i].tube_time == now or bodies.motion[j].tube_time == now
+    is_new = bodies.motion[i].anew == now or bodies.motion[j].anew == now
     return is_new and not holds(bodies.version, event)

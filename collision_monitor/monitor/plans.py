@@ -368,7 +368,7 @@ def renew_plans(
             set_piece(_piece_at(bodies, row, now), m)
             row.fresh = False
             bodies.version[i] += np.uint32(1)
-            m.tube_time, m.covered = now, -inf
+            m.tube_time, m.anew, m.covered = now, now, -inf
             m.tube_0 = max(needed[0], ROOM * row.lately) + 2.0 * drift * age
             m.tube_1 = needed[1] + 2.0 * drift
             m.spread_0 = m.spread_1 = 0.0

@@ -397,7 +397,7 @@ def restart_motion(
         bodies.version[i] += np.uint32(1)
         age = age_of(bodies, i, now)
         set_reference(bodies, i, age, now, bodies.ref_quaternion, i, m)
-        m.tube_time = now
+        m.tube_time = m.anew = now
         m.covered = -np.inf
         m.tube_0 = m.tube_1 = 0.0
         set_cover(bodies, i, now, horizons[i])

@@ -54,6 +54,7 @@ MOTION = np.dtype(
         ("rest", np.float64),  # from which on the body stands; infinite: never
         ("until", np.float64),  # to which it holds; from then on, the next piece of a plan does. Infinite: for ever
         ("piece", np.int64),  # its index among the pieces of all plans, if it is one of a plan
+        ("anew", np.float64),  # when the body was predicted anew, and not only further
     ]
 )
 """The reference motion that predictions rest on. One record per body, because a prediction reads two of them whole."""
