@@ -141,41 +141,36 @@ def _short_mangler(name: str, types: Any, *, abi_tags: Any = (), uid: Any = None
     return short
 
 
-class _ShortSymbols(CompilerBase):  # type: ignore[misc]
-    """Numba's compiler with short symbols."""
-
-    def __init__(self, *arguments: Any) -> None:
-        super().__init__(*arguments)
-        self.state.targetctx.mangler = _short_mangler  # of a copy that this compilation has for itself
-
-
-class KernelCompiler(_ShortSymbols):
+class KernelCompiler(CompilerBase):  # type: ignore[misc]
     """Numba's compiler, which writes into a WholeLibrary."""
 
     def define_pipelines(self) -> list[Any]:
         """Return numba's own passes; they use the library that they find."""
         state = self.state
+        state.targetctx.mangler = _short_mangler  # of a copy that this compilation has for itself
         state.library = WholeLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         state.library.enable_object_caching()
         return [DefaultPassBuilder.define_nopython_pipeline(state)]
 
 
-class DeviceCompiler(_ShortSymbols):
+class DeviceCompiler(CompilerBase):  # type: ignore[misc]
     """Numba's compiler, which writes into a DeviceLibrary."""
 
     def define_pipelines(self) -> list[Any]:
         """Return numba's own passes; they use the library that they find."""
         state = self.state
+        state.targetctx.mangler = _short_mangler  # of a copy that this compilation has for itself
         state.library = DeviceLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         return [DefaultPassBuilder.define_nopython_pipeline(state)]
 
 
-class OutlinedCompiler(_ShortSymbols):
+class OutlinedCompiler(CompilerBase):  # type: ignore[misc]
     """Numba's compiler, which writes into an OutlinedLibrary."""
 
     def define_pipelines(self) -> list[Any]:
         """Return numba's own passes, for a symbol that is the same in every process with the same source."""
         state = self.state
+        state.targetctx.mangler = _short_mangler  # of a copy that this compilation has for itself
         state.func_id.unique_id = Path(folder(state.func_id.modname)).name
         state.library = OutlinedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         return [DefaultPassBuilder.define_nopython_pipeline(state)]

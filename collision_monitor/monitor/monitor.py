@@ -15,6 +15,7 @@ from collision_monitor.monitor.budget import PairBudget
 from collision_monitor.monitor.crowding import leave_out_crowds
 from collision_monitor.monitor.event_list import NO_EVENTS, Events, both
 from collision_monitor.monitor.intake import Observation, checked_nanoseconds
+from collision_monitor.monitor.plans import ENDED
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.monitor.stages import Stages
 from collision_monitor.monitor.state.snapshot import Snapshot, restore_stages
@@ -189,8 +190,7 @@ class Monitor(Stages):
             return None
         zero = self._timeline.now if stamp is None else self._timeline.seconds(stamp)
         if zero + plan.times[-1] < self._timeline.now:
-            late = self._timeline.now - zero - plan.times[-1]
-            raise InputError(f"{name}: expected a plan that is not over, got one that ended {late:.3f} s ago")
+            raise InputError(ENDED.format(id=object_id, late=self._timeline.now - zero - plan.times[-1]))
         return zero
 
     def refuse(self, reason: Refusal, text: str, count: int = 1) -> None:
@@ -242,7 +242,7 @@ class Monitor(Stages):
         self._intake.take(seen, timeline.seconds(seen.stamp_ns), roster, self._uncertain, p.rate_by_name, refusals)
         step = StepContext(roster, p, self._settings, timeline.now, self._answers.step_count + 1)
         budget = self._time_critical.budget(p)
-        left = self._plans.judge(step, timeline)
+        left = self._plans.judge(step, timeline, refusals)
         new = self._predict_moved(step, bounds_only=budget is not None)  # 2 to 4
         self._examine_due(step, new, budget)  # 5 and 6
         contacts = self._answers.contacts(step, self._active_pairs)  # 7

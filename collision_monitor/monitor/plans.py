@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import allocating_kernel, inlined
 from collision_monitor.broad_phase.hashed_grid import HashedGrid, put_box
-from collision_monitor.errors import InputError
+from collision_monitor.errors import InputError, Refusal
 from collision_monitor.geometry.vector import dot, magnitude
 from collision_monitor.monitor.adaptive_tubes import NARROWEST, widest_tube
+from collision_monitor.monitor.refusals import Refusals
 from collision_monitor.monitor.state.roster import Roster
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage, check_range
 from collision_monitor.monitor.state.timeline import Timeline
@@ -42,7 +43,8 @@ PLAN: Final = np.dtype(
     [
         ("apart", np.float64),  # m: how far the body was off its plan at its last state
         ("turned", np.float64),  # rad
-        ("lately", np.float64),  # m: how far its surface was off in the last steps, see FORGOTTEN
+        ("lately", np.float64),  # m: how far its surface may have been off since its last states, see FORGOTTEN
+        ("drifted", np.float64),  # m/s: how fast it may have drifted off while it was silent, likewise
         ("tube", np.float64),  # m: how far the plan may be off its pieces
         ("across", np.float64),  # of its Tolerance
         ("along", np.float64),
@@ -66,12 +68,14 @@ ROOM: Final = 1.5
 """Width of a tube, in deviations of now. Smaller: a body whose deviation varies is predicted anew more often."""
 
 FORGOTTEN: Final = 0.1
-"""Part of a deviation that is forgotten in each step. Larger: narrower bounds, which a noisy body leaves more often."""
+"""Part of a deviation that is forgotten at each state. Larger: narrower bounds, which a noisy body leaves oftener."""
 
-TOO_WIDE: Final = 4.0
+TOO_WIDE: Final = 8.0
 """Width of a tube, in those that the body needs, from which on it is predicted anew with a narrower one."""
 
 NO_STAMP: Final = -(2**63)
+
+ENDED: Final = "object {id}: expected a plan that is not over, got one that ended {late:.3f} s ago"
 
 FOLLOWS, LEFT, OVER = range(3)
 """What becomes of a plan in a step."""
@@ -155,13 +159,16 @@ class Plans(Stage):
 
     # ------------------------------------------------------------------ the step
 
-    def judge(self, step: StepContext, timeline: Timeline) -> Slots:
-        """Advance each plan to the piece that holds now, drop those that end, and return the slots that left theirs."""
+    def judge(self, step: StepContext, timeline: Timeline, refusals: Refusals) -> Slots:
+        """Advance each plan to the piece that holds now, drop those that end, and return the slots that left theirs.
+
+        A plan that was over before the first step is refused.
+        """
         if not len(self._rows):
             return NOBODY
         roster = step.roster
         if self._rows["waits"].any():
-            self._begin(timeline)
+            self._begin(timeline, roster, refusals)
         verdicts = np.empty(len(self._rows), np.uint8)
         judge_plans(roster.bodies, self._rows, step.now, verdicts)
         slots = self.slots
@@ -172,8 +179,8 @@ class Plans(Stage):
         roster.renewed.difference_update(self._rows["slot"][renewed].tolist())
         return left
 
-    def _begin(self, timeline: Timeline) -> None:
-        """Let the plans begin that waited for the first step."""
+    def _begin(self, timeline: Timeline, roster: Roster, refusals: Refusals) -> None:
+        """Let the plans begin that waited for the first step, or refuse them."""
         for row in self._rows:
             if not row["waits"]:
                 continue
@@ -183,6 +190,8 @@ class Plans(Stage):
                 pieces[name] += zero
             row["ends"] += zero
             row["waits"] = False
+            if (late := timeline.now - row["ends"]) > 0.0:
+                refusals.add(Refusal.MALFORMED, ENDED.format(id=roster.bodies.id[row["slot"]], late=late))
 
     def renew(self, step: StepContext, inside: Callable[[Slots], Slots], grid: HashedGrid) -> tuple[Slots, Slots]:
         """Make plans the reference motions of the bodies to predict anew, and update their boxes in the grid.
@@ -248,11 +257,11 @@ def _move(rows: Any, pieces: Any, kept: Any, motion: Any) -> int:
     """
     at = 0
     for row in rows:
-        old, size = int(row["first"]), int(row["count"])
+        slot, old, size = int(row["slot"]), int(row["first"]), int(row["count"])
         kept[at : at + size] = pieces[old : old + size]
         kept["piece"][at : at + size] += at - old
-        if motion is not None and not row["fresh"]:
-            motion["piece"][row["slot"]] += at - old
+        if motion is not None and old <= motion["piece"][slot] < old + size:
+            motion["piece"][slot] += at - old
         row["first"], at = at, at + size
     return at
 
@@ -327,7 +336,7 @@ def judge_plans(bodies: Any, rows: Any, now: float, verdicts: Any) -> None:
 def _deviation(bodies: Any, row: Any) -> float:
     """How far (m) the surface of a body was from its plan at its last state."""
     r = bodies.spin_radius[row.slot]
-    off: float = row.apart + row.tube + (r * row.turned if r > 0.0 else 0.0)
+    off: float = row.apart + row.tube + (r * row.turned if 0.0 < r < inf else 0.0)
     return off
 
 
@@ -357,11 +366,11 @@ def renew_plans(
             continue
         m, horizon, age = bodies.motion[i], horizons[i], now - bodies.time[i]
         off, needed = _deviation(bodies, row), _narrow_tube(bodies, i, settings)
-        row.lately = max(off, (1.0 - FORGOTTEN) * row.lately)
         drift = settings.stale_acceleration * age
-        apart = off + 0.5 * drift * age
+        apart, kept = off + 0.5 * drift * age, 1.0 if age > 0.0 else 1.0 - FORGOTTEN
+        row.lately, row.drifted = max(apart, kept * row.lately), max(drift, kept * row.drifted)
         is_off = not (apart <= m.tube_0 and drift <= m.tube_1)
-        is_wide = m.tube_0 > TOO_WIDE * max(needed[0], row.lately, apart) or m.tube_1 > TOO_WIDE * max(needed[1], drift)
+        is_wide = m.tube_0 > TOO_WIDE * max(needed[0], row.lately) or m.tube_1 > TOO_WIDE * max(needed[1], row.drifted)
         if row.fresh or is_off or is_wide:
             if bodies.slack[i] > 0.0:  # 0: the body is new
                 bodies.slack[i] = max(0.5 * bodies.slack[i], SHORTEST_SLACK * horizon)
@@ -369,8 +378,8 @@ def renew_plans(
             row.fresh = False
             bodies.version[i] += np.uint32(1)
             m.tube_time, m.anew, m.covered = now, now, -inf
-            m.tube_0 = max(needed[0], ROOM * row.lately) + 2.0 * drift * age
-            m.tube_1 = needed[1] + 2.0 * drift
+            m.tube_0 = max(needed[0], ROOM * row.lately, off + 2.0 * drift * age)
+            m.tube_1 = needed[1] + 2.0 * row.drifted
             m.spread_0 = m.spread_1 = 0.0
             set_cover(bodies, i, now, horizon)
             put_box(grid, i, swept_box(bodies, i, now, settings.margin))
