@@ -67,7 +67,7 @@ STANDS: Final = 1e-3
 ROOM: Final = 1.5
 """Width of a tube, in deviations of now. Smaller: a body whose deviation varies is predicted anew more often."""
 
-FORGOTTEN: Final = 0.1
+FORGOTTEN: Final = 0.3
 """Part of a deviation that is forgotten at each state. Larger: narrower bounds, which a noisy body leaves oftener."""
 
 TOO_WIDE: Final = 8.0
