@@ -18,6 +18,7 @@ NODE = {
     "PredictedCollisionArray": endpoints.quality_of(Topic.PREDICTIONS),
     "CollisionAlert": endpoints.quality_of(Topic.ALERTS),
     "MonitorStatus": endpoints.quality_of(Topic.STATUS),
+    "ObjectTrajectoryArray": endpoints.quality_of(Topic.TRAJECTORIES),
     "DiagnosticArray": endpoints.quality_of(Topic.SOURCES),
     "ParameterEvent": qos_profile_parameter_events,
 }
