@@ -312,7 +312,7 @@ def body_impact(
 ) -> int:
     """Write the first impact of bodies i and j in the window into the IMPACT record `event`.
 
-    event.status = CLEAR if there is none. BodyPair that overlap, or are within query.margin, at the begin have their
+    event.status = CLEAR if there is none. Bodies that overlap, or are within query.margin, at the begin have their
     impact there. The reference motions and their tubes are those in `bodies`; in the record, i is the body with the
     smaller id. Bodies that follow plans are searched piece by piece. Returns the number of distance queries.
     """

@@ -98,9 +98,6 @@ class Plans(Stage):
         self._rows: NDArray[np.void] = np.zeros(0, PLAN)
         self._pieces: NDArray[np.void] = np.zeros(0, MOTION)
 
-    def __len__(self) -> int:
-        return len(self._rows)
-
     @property
     def slots(self) -> Slots:
         """Slots of the bodies that follow a plan."""
@@ -267,7 +264,7 @@ def _move(rows: Any, pieces: Any, kept: Any, motion: Any) -> int:
 
 
 def _write_pieces(pieces: Any, first: int, plan: Trajectory, start: float) -> None:
-    """Write a plan whose time 0 is `start` (s) into pieces (M,) MOTION, the first of which has the index `first`."""
+    """Write a plan into pieces (M,) MOTION. first: index of the first piece; start: time 0 of the plan (s)."""
     for c, axis in enumerate("xyz"):
         pieces[axis], pieces[f"v{axis}"] = plan.numbers[:, c], plan.numbers[:, LINEAR + c]
         pieces[f"w{axis}"], pieces[f"a{axis}"] = plan.numbers[:, ANGULAR + c], plan.numbers[:, ACCELERATION + c]

@@ -90,7 +90,7 @@ def renew(entries: Any, pairs: Any, bodies: Any, spread: Spread, now: float, ren
     """Write the entries that still hold, then those of the pairs (P, 2) in which a body may be uncertain, into renewed.
 
     A pair also counts if a body's box is wide enough for uncertainty, because a body that declares some later within
-    that width starts no new search. Returns the number of entries.
+    that width starts no new search. Pairs with a plan do not count. Returns the number of entries.
     """
     n = 0
     motion = bodies.motion
@@ -101,6 +101,8 @@ def renew(entries: Any, pairs: Any, bodies: Any, spread: Spread, now: float, ren
             n += 1
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
+        if bodies.planned[i] or bodies.planned[j]:
+            continue
         widened = motion[i].spread_0 + motion[i].spread_1 + motion[j].spread_0 + motion[j].spread_1 > 0.0
         if not (widened or is_uncertain(spread, i) or is_uncertain(spread, j)):
             continue
@@ -190,7 +192,6 @@ class UncertainPredictions(Stage):
         """Add pairs (P, 2) whose swept boxes overlap, found in this step. Drop the entries that no longer hold."""
         if not self.counts(step.profile):
             return
-        pairs = pairs[~step.roster.bodies.planned[pairs].any(axis=1)]
         renewed = np.empty(len(self.entries) + len(pairs), ENTRY)
         entries = renewed[: renew(self.entries, pairs, step.roster.bodies, self.spread, step.now, renewed)]
         if len(pairs):

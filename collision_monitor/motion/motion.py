@@ -339,7 +339,7 @@ def _swept(m: Any, begin: float, sweep: float, half: float) -> Region:
 
 @device
 def _swept_along_plan(bodies: Any, m: Any, begin: float, end: float, half: float) -> Region:
-    """`swept_box` of a body that follows a plan, of which m is the piece that holds first: that of all its pieces."""
+    """`swept_box` of a body that follows a plan: the box of all its pieces. m: the piece that holds first."""
     box, k = _swept(m, begin, max(m.until - begin, 0.0), half), m.piece
     while bodies.pieces[k].until < end:
         k += 1

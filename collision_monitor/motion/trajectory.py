@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from collision_monitor._jit import allocating_kernel
 from collision_monitor.checks.numbers import as_numbers, checked_number
 from collision_monitor.errors import PoseError
-from collision_monitor.motion.course import ARC, turned_for
+from collision_monitor.motion.course import ARC, STRAIGHT, turned_for
 from collision_monitor.motion.motion import turn_quaternion, twist_on
 from collision_monitor.motion.stated_motion import (
     ACCELERATION,
@@ -27,7 +27,7 @@ from collision_monitor.motion.stated_motion import (
     Motion,
 )
 from collision_monitor.shapes.planar import flat_quaternions
-from collision_monitor.shapes.pose import Frozen, Pose, as_pose, multiply
+from collision_monitor.shapes.pose import Frozen, Pose, as_pose, shortest_turns
 from collision_monitor.tolerances import EPSILON, LARGEST_INPUT, NORMALISED, UNIT_QUATERNION
 
 Array = NDArray[np.float64]
@@ -296,13 +296,9 @@ def _still_rows(poses: Array) -> Array:
 
 def _rotation_vectors(before: Array, after: Array) -> Array:
     """Rotation vectors (N, 3) of the shortest rotations from quaternions (N, 4) to others, in world axes (rad)."""
-    turn = multiply(after, before * (-1.0, -1.0, -1.0, 1.0))
-    turn *= np.where(turn[:, 3:] < 0.0, -1.0, 1.0)
-    sine = np.linalg.norm(turn[:, :3], axis=1)
-    sine[sine <= 0.5 * ROUND_OFF_ANGLE] = 0.0
-    turn[sine == 0.0, :3] = 0.0
-    angle = 2.0 * np.arctan2(sine, turn[:, 3])
-    return turn[:, :3] * np.where(sine > 0.0, angle / np.where(sine > 0.0, sine, 1.0), 2.0)[:, None]
+    turn, factor = shortest_turns(before, after)
+    turn[np.linalg.norm(turn, axis=1) <= 0.5 * ROUND_OFF_ANGLE] = 0.0
+    return turn * factor[:, None]
 
 
 def _screws(moved: Array, turns: Array) -> Array:
@@ -372,12 +368,12 @@ def _carry(numbers: Any, ages: Any, out: Any) -> None:
         for c in range(3):
             to[c] = row[c] + there.moved[c]
             to[LINEAR + c], to[ANGULAR + c] = there.velocity[c], there.angular[c]
-            to[ACCELERATION + c] = a[c] if kind == 0 else there.velocity[c] * there.change
+            to[ACCELERATION + c] = a[c] if kind == STRAIGHT else there.velocity[c] * there.change
         for c in range(4):
             to[3 + c] = q[c]
         to[COURSE], to[REST] = row[COURSE], rest - t
         if to[REST] <= 0.0:
-            to[COURSE], to[REST] = 0.0, np.inf
+            to[COURSE], to[REST] = STRAIGHT, np.inf
 
 
 def as_motion(value: Any, name: str) -> Motion | Trajectory:
@@ -398,7 +394,7 @@ class PairPieces(NamedTuple):
 
 def pair_pieces(a: Motion | Trajectory, b: Motion | Trajectory, horizon: float) -> PairPieces:
     """The parts of the time from now to the horizon (s), or to where one of the motions is unknown from."""
-    end = min(horizon, known_until(a), known_until(b))
+    end = min(horizon, _known_until(a), _known_until(b))
     begins = [each.begins for each in (a, b) if isinstance(each, Trajectory)]
     within = [each[np.searchsorted(each, 0.0, side="right") : np.searchsorted(each, end)] for each in begins]
     starts = np.unique(np.concatenate([[0.0], *within]))
@@ -412,6 +408,6 @@ def pair_pieces(a: Motion | Trajectory, b: Motion | Trajectory, horizon: float) 
     return PairPieces(np.append(starts, max(end, 0.0)), rows[0], rows[1], tubes)
 
 
-def known_until(motion: Motion | Trajectory) -> float:
+def _known_until(motion: Motion | Trajectory) -> float:
     """Time (s) from which on a motion is unknown; infinite: never."""
     return float(motion.times[-1]) if isinstance(motion, Trajectory) and motion.then == "unknown" else inf

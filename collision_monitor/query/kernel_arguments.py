@@ -18,8 +18,7 @@ from collision_monitor.shapes.shape_table import ShapeTable
 def tables_of(
     kind: Any, size: Any, margin: Any, radius: Any, vertex_start: Any, vertex_count: Any, vertices: Any,
     vertex_index: Any, local_position: Any, local_rotation: Any, blocks: Any, next_part: Any, index: Any, placed: Any,
-    rotation: Any, quaternion: Any, out: Any, work: Any, tree: Any, answer: Any, triangle: Any,
-    piece: Any,
+    rotation: Any, quaternion: Any, out: Any, work: Any, tree: Any, answer: Any, triangle: Any, piece: Any,
 ) -> tuple[ShapeTable, Parts, Scratch]:  # fmt: skip
     """Group the arrays of `Library.arrays` and of a Scratch, which each of these kernels takes first."""
     table = ShapeTable(

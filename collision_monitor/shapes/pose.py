@@ -66,6 +66,17 @@ def from_rotation_vector(rotation: ArrayLike) -> Array:
     return np.concatenate([np.sinc(angle / (2 * np.pi)) * rotation / 2, np.cos(angle / 2)], axis=-1)
 
 
+def shortest_turns(before: Array, after: Array) -> tuple[Array, Array]:
+    """The shortest rotations from quaternions (N, 4) to others, in world axes.
+
+    Returns the vector parts of their quaternions (N, 3), and the factors (N,) that make them rotation vectors (rad).
+    """
+    turn = multiply(after, before * (-1.0, -1.0, -1.0, 1.0))
+    turn *= np.where(turn[:, 3:] < 0.0, -1.0, 1.0)
+    sine = np.sqrt((turn[:, :3] ** 2).sum(1))
+    return turn[:, :3], np.where(sine > 0.0, 2.0 * np.arctan2(sine, turn[:, 3]) / np.where(sine > 0.0, sine, 1.0), 2.0)
+
+
 def rotation_matrix(quaternion: ArrayLike) -> Array:
     """Rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
     q = np.asarray(quaternion, dtype=np.float64)

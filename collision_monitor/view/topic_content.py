@@ -33,7 +33,7 @@ from collision_monitor.monitor.state.timeline import NANOSECOND
 from collision_monitor.pipeline.catalogue import Catalogue
 from collision_monitor.pipeline.settings_event import RULES
 from collision_monitor.records import StateFlag
-from collision_monitor.shapes.pose import multiply
+from collision_monitor.shapes.pose import shortest_turns
 from collision_monitor.tolerances import LARGEST_INPUT, UNIT_QUATERNION
 from collision_monitor.uncertainty.spread import worst_stddevs
 from collision_monitor.view.bodies import DescribedBodies, described_pieces
@@ -263,12 +263,8 @@ def _estimate_twists(states: States, before: States, elapsed: NDArray[np.float64
     jumped = (states["flags"][unknown] & StateFlag.DISCONTINUITY) != 0
     elapsed = np.where(jumped, np.inf, elapsed[unknown])[:, None]
     moved = np.where(np.isinf(elapsed), 0.0, states["position"][unknown] - before["position"][unknown])
-    turn = multiply(states["quaternion"][unknown], before["quaternion"][unknown] * (-1.0, -1.0, -1.0, 1.0))
-    turn *= np.where(turn[:, 3:] < 0.0, -1.0, 1.0)
-    sine = np.linalg.norm(turn[:, :3], axis=1, keepdims=True)
-    angle = 2.0 * np.arctan2(sine, turn[:, 3:])
+    turn, factor = shortest_turns(before["quaternion"][unknown], states["quaternion"][unknown])
     states["linear"][unknown] = moved / elapsed
-    axis = turn[:, :3] / np.where(sine > 0.0, sine, 1.0)
-    states["angular"][unknown] = axis * angle / elapsed
+    states["angular"][unknown] = turn * factor[:, None] / elapsed
     bent = unknown & ((states["flags"] & StateFlag.BODY_TWIST) != 0)  # the estimates are along the world's axes
     states["flags"][bent] &= ~np.uint32(StateFlag.BODY_TWIST | StateFlag.ACCELERATION_VALID)

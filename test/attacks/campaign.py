@@ -40,7 +40,7 @@ STEP: Final = 10_000_000
 SLOWEST: Final = 0.1
 """s for one input of up to LARGEST bytes. The time of the processor counts too, as others share the cores."""
 YARDSTICK: Final = 0.0105
-"""s of the processor that `slowness` takes on the core for which SLOWEST is promised, an idle one of 2023."""
+"""s of the processor that `slowness` took at best on the core on which SLOWEST was measured, in November 2026."""
 STUCK: Final = 20.0
 """s of wall time that no input may take, whatever the load: it waits for something that does not come."""
 LARGEST: Final = 1 << 20

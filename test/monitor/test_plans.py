@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from contact_intervals import SHAPES as SOLIDS
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -15,16 +16,7 @@ from collision_monitor.monitor.state.snapshot import Snapshot
 from collision_monitor.records import STATE, PredictionStatus
 
 STEP = 50_000_000
-SHAPES: list[Any] = [
-    cm.Sphere(0.3),
-    cm.Box((0.9, 0.5, 0.4)),
-    cm.Capsule(0.15, 0.8),
-    [(cm.Box((0.8, 0.2, 0.2)), cm.Pose((0.3, 0, 0))), (cm.Sphere(0.2), cm.Pose((-0.4, 0.3, 0.1)))],
-    cm.Mesh(
-        np.array([(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (0, 0, 1)], float) * 0.4,
-        np.array([(0, 2, 1), (0, 3, 2), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)]),
-    ),
-]
+SHAPES: list[Any] = [cm.Sphere(0.3), *(SOLIDS[name] for name in ("box", "capsule", "compound", "mesh"))]
 
 
 def plan(rng: np.random.Generator, between: Any, size: float = 2.0) -> cm.Trajectory:

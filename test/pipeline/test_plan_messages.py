@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from session_scene import CONTACTS, NODE, PREDICTIONS, SHAPES, START, STATES, TYPES
 
 from collision_monitor.codec import (
     ObjectTrajectory,
@@ -26,16 +27,8 @@ from collision_monitor.session.replaying.replay_report import Verdict
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Box, Sphere
 
-NODE = "/object_monitor"
-TYPES = {
-    f"{NODE}/objects/shapes": "ObjectDescriptionArray",
-    f"{NODE}/objects/states": "ObjectStateArray",
-    f"{NODE}/objects/trajectories": "ObjectTrajectoryArray",
-    f"{NODE}/contacts": "ContactArray",
-    f"{NODE}/predictions": "PredictedCollisionArray",
-}
-SHAPES, STATES, PLANS, CONTACTS, PREDICTIONS = TYPES
-START, STEP = 1_700_000_000_000_000_000, 50_000_000
+PLANS = f"{NODE}/objects/trajectories"
+STEP = 50_000_000
 ZEROS = np.zeros(4)
 
 
@@ -139,7 +132,7 @@ def test_a_message_of_another_frame_or_type_is_refused() -> None:
 def test_a_recorded_plan_is_replayed_to_the_same_bytes(tmp_path: Path) -> None:
     made = pipeline()
     path = tmp_path / "plans.mcap"
-    recorder = Recorder(path, TYPES, made.metadata(node=NODE), snapshots=True)
+    recorder = Recorder(path, {**TYPES, PLANS: "ObjectTrajectoryArray"}, made.metadata(node=NODE), snapshots=True)
     now = START
     post = ObjectDescription(2, Sphere(0.2), name="post", static=True, pose=Pose((1, 1.2, 0)))
     shapes = encode_descriptions(START, "world", [ObjectDescription(1, Box((0.4, 0.4, 0.4))), post])

@@ -71,7 +71,7 @@ CLEAR_IMPACT: Final = Impact("clear", math.inf, math.inf, None)
 def impact_of_times(times: tuple[float, float], arguments: tuple[Any, Any, Any, Any]) -> Impact:
     """Impact of two convex solids or meshes that come together within these times (s); infinite: never."""
     lower, upper = times
-    if lower == math.inf:
+    if lower == math.inf:  # most pairs: they need no method
         return CLEAR_IMPACT
     shape_a, motion_a, shape_b, motion_b = arguments
     used = Method.CONSERVATIVE_ADVANCEMENT
@@ -83,7 +83,9 @@ def impact_of_times(times: tuple[float, float], arguments: tuple[Any, Any, Any, 
 
 
 def timed_impact(lower: float, upper: float, method: Method, arguments: tuple[Any, Any, Any, Any]) -> Impact:
-    """Return an impact that computes its contact when that is read."""
+    """Return an impact that computes its contact when that is read; the clear one for an infinite lower end."""
+    if lower == math.inf:
+        return CLEAR_IMPACT
     made = object.__new__(Impact)
     status = "hit" if upper < math.inf else "unresolved"
     made.__dict__.update(status=status, lower=lower, upper=upper, method=method, _arguments=arguments)

@@ -1,4 +1,4 @@
-"""The first impact of two bodies of which at least one follows a trajectory: piece after piece, see `PairPieces`."""
+"""The first impact of two bodies that follow trajectories, piece after piece (`PairPieces`)."""
 
 from __future__ import annotations
 

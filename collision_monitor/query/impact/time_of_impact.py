@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from math import inf
-
 from collision_monitor.checks.numbers import checked_number
 from collision_monitor.meshes.trees.shape_trees import CERTAIN
 from collision_monitor.motion.stated_motion import Motion
 from collision_monitor.motion.trajectory import Trajectory, as_motion
 from collision_monitor.query.body import KeptSlots, kept_slots
 from collision_monitor.query.contact.contact import check_kinds, plant_bodies, plant_for_meshes
-from collision_monitor.query.impact.impact import CLEAR_IMPACT, Impact, impact_of_times, timed_impact
+from collision_monitor.query.impact.impact import Impact, impact_of_times, timed_impact
 from collision_monitor.query.impact.impact_by_method import impact_by_method
 from collision_monitor.query.impact.impact_kernel import DECIDED, first_impact
 from collision_monitor.query.impact.impact_of_motions import impact_of_motions
@@ -59,8 +57,6 @@ def time_of_impact(
     motion_a, motion_b = as_motion(motion_a, "motion A"), as_motion(motion_b, "motion B")
     if isinstance(motion_a, Trajectory) or isinstance(motion_b, Trajectory):
         lower, upper = planned_impact((shape_a, motion_a), (shape_b, motion_b), query)
-        if lower == inf:
-            return CLEAR_IMPACT
         return timed_impact(lower, upper, Method.CONSERVATIVE_ADVANCEMENT, (shape_a, motion_a, shape_b, motion_b))
     kept_a, kept_b = kept_slots(shape_a), kept_slots(shape_b)
     if kept_a is not None and kept_b is not None and _is_answered(kept_a, motion_a, kept_b, motion_b):
@@ -73,8 +69,6 @@ def time_of_impact(
     check_kinds(a.body, a.motion.pose, b.body, b.motion.pose)
     plant_bodies(a.body, b.body)
     lower, upper, used = impact_of_motions(a, b, query)
-    if lower == inf:
-        return CLEAR_IMPACT
     return timed_impact(lower, upper, used, (shape_a, motion_a, shape_b, motion_b))
 
 

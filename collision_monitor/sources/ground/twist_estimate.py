@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.records import StateFlag
-from collision_monitor.shapes.pose import multiply
+from collision_monitor.shapes.pose import shortest_turns
 
 Floats = NDArray[np.float64]
 States = NDArray[np.void]
@@ -128,10 +128,7 @@ def _fit(
     oldest = used.sum(1) - 1
     rows = np.arange(len(bins))
     elapsed = (bins["first"][:, 0] - bins["first"][rows, oldest]) * _NANOSECOND
-    turn = multiply(bins["turn"][:, 0], bins["turn"][rows, oldest] * (-1.0, -1.0, -1.0, 1.0))
-    turn *= np.where(turn[:, 3:] < 0.0, -1.0, 1.0)
-    sine = np.sqrt((turn[:, :3] ** 2).sum(1))
-    rate = np.where(sine > 0.0, 2.0 * np.arctan2(sine, turn[:, 3]) / np.where(sine > 0.0, sine, 1.0), 2.0) / elapsed
-    angular = turn[:, :3] * rate[:, None]
+    turn, factor = shortest_turns(bins["turn"][rows, oldest], bins["turn"][:, 0])
+    angular = turn * (factor / elapsed)[:, None]
     uncertain = position_stddev / np.sqrt(spread), np.sqrt(2.0) * orientation_stddev / elapsed
     return np.column_stack([linear, angular, *uncertain])

@@ -2,27 +2,15 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from math import inf, sqrt
-from typing import Any
 
 import numpy as np
 import pytest
+from contact_intervals import SHAPES, check_intervals
 
 import collision_monitor as cm
-from collision_monitor import Motion, Pose, contact, impacts
+from collision_monitor import Motion, Pose, impacts
 from collision_monitor.errors import InputError
-
-SHAPES: dict[str, Any] = {
-    "box": cm.Box((0.9, 0.5, 0.4)),
-    "capsule": cm.Capsule(0.15, 0.8),
-    "hull": cm.ConvexHull(np.random.default_rng(3).normal(size=(14, 3)) * 0.3),
-    "compound": [(cm.Box((0.8, 0.2, 0.2)), Pose((0.3, 0, 0))), (cm.Sphere(0.2), Pose((-0.4, 0.3, 0.1)))],
-    "mesh": cm.Mesh(
-        np.array([(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (0, 0, 1)], float) * 0.4,
-        np.array([(0, 2, 1), (0, 3, 2), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)]),
-    ),
-}
 
 
 def test_a_ball_that_passes_another_one() -> None:
@@ -58,19 +46,7 @@ def test_dense_samples_find_the_same_intervals(kinds: tuple[str, str]) -> None:
         other = Motion(Pose(rng.normal(size=3) * 0.5), rng.normal(size=3) * 0.5, rng.normal(size=3))
         found = impacts(a, one, b, other, 3.0)
         several += len(found) > 1
-        ends = [time for each in found for time in (*each.entry, *each.exit)]
-        assert all(before <= after for before, after in pairwise(ends))
-        for t in np.linspace(0.0, 3.0, 301):
-            gap = contact(a, one.at(t), b, other.at(t))
-            inside = any(each.entry[1] <= t <= each.exit[0] for each in found)
-            near = any(each.entry[0] <= t < each.entry[1] or each.exit[0] < t <= each.exit[1] for each in found)
-            if inside:
-                assert gap.signed_distance <= 1e-5
-            elif not near:
-                assert gap.signed_distance > -gap.error_bound - 1e-9
-        for each in found:
-            assert each.entry[1] < inf
-            assert each.exit[1] == inf or each.exit[1] - each.exit[0] < 0.02
+        check_intervals(found, a, one, b, other, 3.0, 301)
     assert several > 0
 
 

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from contact_intervals import SHAPES as SOLIDS
+from contact_intervals import check_intervals
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -15,17 +17,7 @@ from collision_monitor.errors import PoseError, UnsupportedError
 
 Array = NDArray[np.float64]
 
-SHAPES: dict[str, Any] = {
-    "sphere": cm.Sphere(0.3),
-    "box": cm.Box((0.9, 0.5, 0.4)),
-    "capsule": cm.Capsule(0.15, 0.8),
-    "hull": cm.ConvexHull(np.random.default_rng(3).normal(size=(14, 3)) * 0.3),
-    "compound": [(cm.Box((0.8, 0.2, 0.2)), cm.Pose((0.3, 0, 0))), (cm.Sphere(0.2), cm.Pose((-0.4, 0.3, 0.1)))],
-    "mesh": cm.Mesh(
-        np.array([(-1, -1, -1), (1, -1, -1), (1, 1, -1), (-1, 1, -1), (0, 0, 1)], float) * 0.4,
-        np.array([(0, 2, 1), (0, 3, 2), (0, 1, 4), (1, 2, 4), (2, 3, 4), (3, 0, 4)]),
-    ),
-}
+SHAPES: dict[str, Any] = {"sphere": cm.Sphere(0.3), **SOLIDS}
 
 
 def plan(rng: np.random.Generator, *, between: Any, then: Any = "rest", planar: bool = False) -> cm.Trajectory:
@@ -57,17 +49,7 @@ def test_dense_samples_find_the_same_intervals(kinds: tuple[str, str], between: 
         if found:
             hits += 1
             assert found[0].entry[0] == pytest.approx(impact.lower, abs=1e-4)
-        for t in np.linspace(0.0, 3.0, 151):
-            gap = cm.contact(a, one.at(t), b, other.at(t))
-            inside = any(each.entry[1] <= t <= each.exit[0] for each in found)
-            near = any(each.entry[0] <= t < each.entry[1] or each.exit[0] < t <= each.exit[1] for each in found)
-            if inside:
-                assert gap.signed_distance < 1e-5
-            elif not near:
-                assert gap.signed_distance > -gap.error_bound - 1e-9
-        for each in found:
-            assert each.entry[1] < inf
-            assert each.exit[1] == inf or each.exit[1] - each.exit[0] < 0.02
+        check_intervals(found, a, one, b, other, 3.0, 151)
     assert hits > 0
 
 
@@ -193,7 +175,7 @@ def test_a_trajectory_needs_the_exact_method_and_a_motion_is_named() -> None:
 
 
 def test_a_long_plan_costs_memory_and_hardly_any_time() -> None:
-    """10,000 points of which 20 lie before the horizon give the same pieces as those 20."""
+    """A plan of 10,000 points, and its first 30, which reach beyond the horizon, give the same times."""
     times = np.linspace(0.0, 1000.0, 10_001)
     path = cm.Trajectory(times, np.stack([times, np.sin(times), 0.0 * times], axis=1))
     short = cm.Trajectory(times[:30], path.poses[:30])
