@@ -11,10 +11,10 @@ from collision_monitor.shapes.registry import Mesh, Points
 from collision_monitor.shapes.shape import array_bytes
 
 MOST_MEMORY: Final = 512 << 20
-"""Memory that all described objects may need together (bytes, as `object_memory` estimates it): 160,000 objects of one
+"""Memory that all described objects may need together (bytes, as `object_memory` estimates it): 145,000 objects of one
 shape, or hulls of 5,000,000 points. Descriptions beyond it are refused."""
 
-OBJECT_BYTES: Final = 2660
+OBJECT_BYTES: Final = 2900
 SHAPE_BYTES: Final = 700
 ALLOWED_BYTES: Final = 150
 """Memory of an object, of each of its shapes without their arrays, and of each id in `allowed` (measured)."""
