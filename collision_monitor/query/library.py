@@ -64,30 +64,38 @@ class Library:
 
         Raises UnsupportedError, ShapeError as `ShapeTableBuilder.append` does.
         """
-        for shape, _ in pieces:
-            if isinstance(shape, WITH_TREE):
-                shape_tree(shape)  # the shape keeps it: no other thread waits for it
+        # the shapes keep them: no other thread waits for one
+        trees = [shape_tree(shape) if isinstance(shape, WITH_TREE) else None for shape, _ in pieces]
         builder = self._builder
         with self._lock:
             while self._freed:  # terminates: what is freed meanwhile is what is no longer asked about
-                for slot in self._freed.popleft():
-                    builder.remove(slot)
+                self._free(self._freed.popleft())
             numbers: list[int] = []
             try:
-                for shape, pose in pieces:
-                    tree = shape_tree(shape) if isinstance(shape, WITH_TREE) else None
+                for (shape, pose), tree in zip(pieces, trees, strict=True):
                     numbers.append(builder.append(shape, pose, tree=tree))
             except BaseException:
-                for slot in numbers:
-                    builder.remove(slot)
+                self._free(numbers)
                 raise
             if builder.table is not self.tuples[0]:
                 self._show()
-            parts, after = self._parts, -1
-            for slot in reversed(numbers):
-                parts.next[slot], parts.placed[slot] = after, slot in builder.posed
-                after = slot
+            if len(numbers) > 1 or numbers[0] in builder.posed:
+                self._join(numbers)
             return Slots(numbers, self._freed)
+
+    def _join(self, numbers: list[int]) -> None:
+        """Make these slots one chain; a free slot is a chain of its own, at its origin."""
+        parts, after = self._parts, -1
+        for slot in reversed(numbers):
+            parts.next[slot], parts.placed[slot] = after, slot in self._builder.posed
+            after = slot
+
+    def _free(self, numbers: list[int]) -> None:
+        """Make these slots free for other shapes."""
+        for slot in numbers:
+            self._builder.remove(slot)
+        if len(numbers) > 1 or (numbers and numbers[0] in self._builder.posed):
+            self._parts.next[numbers], self._parts.placed[numbers] = -1, False
 
     def plant(self, pieces: Sequence[tuple[Shape, Pose | None]], slots: Slots) -> None:
         """Give the convex pieces of an object the trees that their pairs with meshes need, where they have one."""

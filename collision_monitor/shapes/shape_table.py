@@ -17,7 +17,6 @@ from collision_monitor.errors import InputError, ShapeError, UnsupportedError
 from collision_monitor.shapes.forest import REACH, Forest
 from collision_monitor.shapes.kind import Row
 from collision_monitor.shapes.kinds.convex_hull import CONVEX_HULL, TRIANGLE_RING
-from collision_monitor.shapes.kinds.half_space import HALF_SPACE
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import SUPPORTED_SHAPES, Points, Shape, kind_of
 
@@ -124,6 +123,7 @@ class ShapeTableBuilder:
         self._free_blocks: dict[int, list[int]] = {}
         self._blocks: dict[bytes, tuple[int, int]] = {}  # bytes of the points -> start, count
         self._users: dict[int, tuple[bytes, int]] = {}  # start -> key of the block, number of slots that share it
+        self._trees: dict[int, int] = {}  # slot -> first block of its tree
         self.posed: set[int] = set()
 
     @classmethod
@@ -209,15 +209,14 @@ class ShapeTableBuilder:
 
     def plant(self, slot: int, tree: Array) -> None:
         """Give the shape in a slot, which is no half-space, a tree of its surface."""
-        first = self._forest.add(tree)
+        first = self._trees[slot] = self._forest.add(tree)
         self.table = self.table._replace(blocks=self._forest.blocks)
         self.table.size[slot, TREE] = first + 1
 
     def remove(self, slot: int) -> None:
         """Free a slot for reuse. Raises InputError if it holds no shape."""
         table = self.table
-        kind = table.kind[slot] if 0 <= slot < self._slots else 0
-        if kind == 0:
+        if not 0 <= slot < self._slots or not table.kind[slot]:
             raise InputError(f"expected the slot of a shape in the table, got {slot!r}")
         if table.vertex_count[slot]:
             start = int(table.vertex_start[slot])
@@ -229,8 +228,8 @@ class ShapeTableBuilder:
                 del self._users[start], self._blocks[key]
                 self._free_blocks.setdefault(int(table.vertex_count[slot]), []).append(start)
             table.vertex_count[slot] = 0
-        if table.size[slot, TREE] > 0.0 and kind != HALF_SPACE:
-            self._forest.drop(int(table.size[slot, TREE]) - 1)
+        if slot in self._trees:
+            self._forest.drop(self._trees.pop(slot))
             table.size[slot, TREE] = 0.0
         table.kind[slot] = 0
         self._free_slots.append(slot)

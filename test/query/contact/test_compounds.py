@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 import collision_monitor as cm
 from collision_monitor.narrow_phase.dispatch import contact_batch
+from collision_monitor.query import body
 from collision_monitor.shapes.convex_pieces import convex_pieces
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Box, Capsule, Circle, HalfSpace, Mesh, Polygon, Sphere
@@ -92,3 +93,18 @@ def test_concave_polygons_of_many_parts() -> None:
     c = cm.contact(Polygon(star), Pose(), Polygon(star), Pose((5.0, 0, 0)))
     assert c.signed_distance == pytest.approx(1.0)
     assert cm.contact(Polygon(star), Pose((0, 3, 0)), Circle(0.5), Pose()).signed_distance == pytest.approx(0.5)
+
+
+def test_shapes_take_the_place_of_objects_that_are_gone() -> None:
+    """A shape in the slot of a piece that stood elsewhere, or had others behind it, stands at its own origin, alone."""
+    rng = np.random.default_rng(5)
+    for _ in range(300):
+        pieces = [(cm.Sphere(0.5), cm.Pose(tuple(rng.uniform(3.0, 9.0, 3)))) for _ in range(rng.integers(1, 4))]
+        nearest = min(float(np.linalg.norm(pose.position)) for _, pose in pieces) - 1.0
+        distance = cm.contact(pieces, cm.Pose(), cm.Sphere(0.5), cm.Pose()).signed_distance
+        assert distance == pytest.approx(nearest, abs=1e-9)
+        body._compound._results.clear()  # what is remembered keeps its slots
+        balls = [cm.Sphere(radius) for radius in (0.1, 0.2, 0.3, 0.4)]
+        for ball in balls:
+            distance = cm.contact(ball, cm.Pose(), balls[0], cm.Pose((2.0, 0.0, 0.0))).signed_distance
+            assert distance == pytest.approx(1.9 - ball.radius, abs=1e-12)
