@@ -21,14 +21,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 import collision_monitor as cm
-from collision_monitor.monitor import uncertain_predictions
+from collision_monitor.monitor import pair_probabilities
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import STATE
 from collision_monitor.world import make_scene
 
 States = NDArray[np.void]
 Scene = tuple[Sequence[ObjectDescription], Iterator[States]]
-PLANES, SAMPLES = uncertain_predictions.FINEST_WITH_PLANES, float("inf")
+PLANES, SAMPLES = pair_probabilities.FINEST_WITH_PLANES, float("inf")
 
 
 def simulated(name: str, objects: int | None, noise: float) -> Scene:
@@ -91,7 +91,7 @@ def measure(name: str, steps: int, noise: float, threads: int) -> str:
         rows = next(states)
         reported = {}
         for way, (_, finest) in ways.items():
-            uncertain_predictions.FINEST_WITH_PLANES = finest  # type: ignore[misc]
+            pair_probabilities.FINEST_WITH_PLANES = finest  # type: ignore[misc]
             began = time.perf_counter()
             result = monitors[way].step(50_000_000 * step, rows)
             took[way].append(1e3 * (time.perf_counter() - began))

@@ -274,7 +274,7 @@ class Monitor(Stages):
         if outside is not None:
             active.end_of(outside)
         moved, ending = self._tracking.find(step, self._uncertain)
-        replanned, lasting = self._plans.renew(step, self._tracking.inside, candidates.grid)
+        replanned, lasting = self._plans.renew(step, self._tracking.inside, candidates.grid, self._uncertain)
         step.work.objects_moved += len(replanned)
         ending = np.concatenate([ending, lasting])
         which = np.concatenate([moved, replanned, ending])

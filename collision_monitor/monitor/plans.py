@@ -24,7 +24,15 @@ from collision_monitor.monitor.state.roster import Roster
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage, check_range
 from collision_monitor.monitor.state.timeline import Timeline
 from collision_monitor.monitor.step_context import StepContext
-from collision_monitor.monitor.tracking import LONGEST_SLACK, SHORTEST_SLACK, set_cover
+from collision_monitor.monitor.tracking import (
+    LONGEST_SLACK,
+    SHORTEST_SLACK,
+    WIDER,
+    Uncertainty,
+    set_cover,
+    uncertainty_of,
+)
+from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
 from collision_monitor.motion.course import ARC, STRAIGHT
 from collision_monitor.motion.motion import (
     MOTION,
@@ -38,6 +46,7 @@ from collision_monitor.motion.motion import (
 from collision_monitor.motion.stated_motion import ACCELERATION, ANGULAR, COURSE, LINEAR, REST
 from collision_monitor.motion.trajectory import Tolerance, Trajectory
 from collision_monitor.shapes.pose import rotation_matrix
+from collision_monitor.uncertainty.spread import surface_spread, swing_radius
 
 PLAN: Final = np.dtype(
     [
@@ -190,7 +199,10 @@ class Plans(Stage):
             if (late := timeline.now - row["ends"]) > 0.0:
                 refusals.add(Refusal.MALFORMED, ENDED.format(id=roster.bodies.id[row["slot"]], late=late))
 
-    def renew(self, step: StepContext, inside: Callable[[Slots], Slots], grid: HashedGrid) -> tuple[Slots, Slots]:
+    def renew(
+        self, step: StepContext, inside: Callable[[Slots], Slots], grid: HashedGrid,
+        uncertain: UncertainPredictions,
+    ) -> tuple[Slots, Slots]:  # fmt: skip
         """Make plans the reference motions of the bodies to predict anew, and update their boxes in the grid.
 
         inside: leaves out the slots of bodies outside of the region. Returns the slots of those bodies, and of those
@@ -201,7 +213,8 @@ class Plans(Stage):
         found, rows = np.empty((2, len(self._rows)), np.int32), self._rows
         which = np.flatnonzero(np.isin(rows["slot"], inside(self.slots)))
         seconds, settings = (step.now, step.horizons), step.settings.motion
-        n, m = renew_plans(step.roster.bodies, rows, which, grid, seconds, settings, found)
+        uncertainty = uncertainty_of(uncertain, step)
+        n, m = renew_plans(step.roster.bodies, uncertainty, rows, which, grid, seconds, settings, found)
         return found[0, :n], found[1, :m]
 
     # ------------------------------------------------------------------ snapshots
@@ -345,10 +358,21 @@ def _narrow_tube(bodies: Any, i: int, settings: Any) -> tuple[float, float]:
     return part * tube_0, part * tube_1
 
 
+@inlined
+def _uncertain_width(bodies: Any, uncertainty: Uncertainty, i: int, age: float, stale_acceleration: float) -> float:
+    """Width (m) by which the errors of body i, which follows a plan, widen its box, see `planned_impacts.py`."""
+    spread, sigmas = uncertainty
+    if sigmas == 0.0:
+        return 0.0
+    off: float = surface_spread(bodies, spread, i, swing_radius(bodies, spread, i), age, 0.0, stale_acceleration)[0]
+    return sigmas * off
+
+
 @allocating_kernel
 def renew_plans(
-    bodies: Any, rows: Any, which: Any, grid: HashedGrid, seconds: Any, settings: Any, found: Any
-) -> tuple[int, int]:
+    bodies: Any, uncertainty: Uncertainty, rows: Any, which: Any, grid: HashedGrid, seconds: Any, settings: Any,
+    found: Any,
+) -> tuple[int, int]:  # fmt: skip
     """`find_moved` and `restart_motion` of the bodies that follow the plans rows[which], with their plans as motions.
 
     Writes the slots of those that were predicted anew to found[0], and of those that end too soon to found[1]; returns
@@ -366,7 +390,8 @@ def renew_plans(
         drift = settings.stale_acceleration * age
         apart, kept = off + 0.5 * drift * age, 1.0 if age > 0.0 else 1.0 - FORGOTTEN
         row.lately, row.drifted = max(apart, kept * row.lately), max(drift, kept * row.drifted)
-        is_off = not (apart <= m.tube_0 and drift <= m.tube_1)
+        width = _uncertain_width(bodies, uncertainty, i, age, settings.stale_acceleration)
+        is_off = not (apart <= m.tube_0 and drift <= m.tube_1 and width <= m.spread_0)
         is_wide = m.tube_0 > TOO_WIDE * max(needed[0], row.lately) or m.tube_1 > TOO_WIDE * max(needed[1], row.drifted)
         if row.fresh or is_off or is_wide:
             if bodies.slack[i] > 0.0:  # 0: the body is new
@@ -377,7 +402,7 @@ def renew_plans(
             m.tube_time, m.anew, m.covered = now, now, -inf
             m.tube_0 = max(needed[0], ROOM * row.lately, off + 2.0 * drift * age)
             m.tube_1 = needed[1] + 2.0 * row.drifted
-            m.spread_0 = m.spread_1 = 0.0
+            m.spread_0, m.spread_1 = WIDER * width, 0.0
             set_cover(bodies, i, now, horizon)
             put_box(grid, i, swept_box(bodies, i, now, settings.margin))
             found[0, n] = i

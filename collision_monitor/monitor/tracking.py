@@ -50,6 +50,11 @@ class Uncertainty(NamedTuple):
     sigmas: float  # standard deviations by which boxes are widened; 0: nothing is uncertain
 
 
+def uncertainty_of(uncertain: UncertainPredictions, step: StepContext) -> Uncertainty:
+    """Return the uncertainties that widen boxes in a step."""
+    return Uncertainty(uncertain.spread, uncertain.sigmas(step.profile))
+
+
 class Tracking(Stage):
     """Compares the bodies' states with their predicted motions, and starts the bodies anew that left them."""
 
@@ -111,7 +116,7 @@ class Tracking(Stage):
         """Find the slots of bodies that left their predicted motion, and of those whose prediction ends too soon."""
         roster = step.roster
         found = np.empty((2, roster.top), np.int32)
-        uncertainty = Uncertainty(uncertain.spread, uncertain.sigmas(step.profile))
+        uncertainty = uncertainty_of(uncertain, step)
         settings, columns = step.settings.motion, self._columns
         seconds = step.now, step.horizons
         n, m, moving = find_moved(roster.bodies, uncertainty, roster.top, seconds, settings, columns, found)
@@ -128,7 +133,7 @@ class Tracking(Stage):
     ) -> None:
         """Start `moved` anew from their last states, and predict `ending` further. Update their boxes in the grid."""
         bodies, settings = step.roster.bodies, step.settings.motion
-        uncertainty = Uncertainty(uncertain.spread, uncertain.sigmas(step.profile))
+        uncertainty = uncertainty_of(uncertain, step)
         self._make_room(step.roster.capacity)
         limits = FUTILE_STEPS * step.period, self._are_narrow
         seconds = step.now, step.horizons

@@ -10,7 +10,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from math import inf, nan
 from statistics import NormalDist
-from typing import Any, Final, NamedTuple
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,14 @@ from collision_monitor.impact.acceleration_bounds import Intervals, widen_interv
 from collision_monitor.impact.impact_record import holds, ids_of_keys, pair_keys, write_pair
 from collision_monitor.impact.pair_impacts import cover_of
 from collision_monitor.monitor.budget import SAMPLE, PairBudget
+from collision_monitor.monitor.pair_probabilities import (
+    ANSWERS,
+    FINEST_WITH_PLANES,
+    Workspaces,
+    make_workspaces,
+    pair_probabilities,
+    with_plans,
+)
 from collision_monitor.monitor.shared_work import share
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.step_context import StepContext
@@ -29,23 +37,16 @@ from collision_monitor.records import PREDICTION, Method, PredictionStatus
 from collision_monitor.settings.profile import Profile
 from collision_monitor.uncertainty.impact_distribution import EARLIEST, MOST_LIKELY, PROBABILITY
 from collision_monitor.uncertainty.near_pairs import NearPairRange, find_near
-from collision_monitor.uncertainty.plane_memory import PlaneMemory, make_plane_memory
-from collision_monitor.uncertainty.plane_probability import LEFT, plane_probabilities
+from collision_monitor.uncertainty.plane_probability import plane_probabilities
 from collision_monitor.uncertainty.sampled_impacts import (
-    COSTLY_PARTS,
-    SPINNING_PARTS,
     Sampling,
-    find_divisors,
-    impact_probabilities,
 )
-from collision_monitor.uncertainty.samples.error_samples import Workspace, make_workspace
 from collision_monitor.uncertainty.samples.normal_samples import normal_samples, sample_columns
 from collision_monitor.uncertainty.spread import FIFTH_ROOT, Spread, is_uncertain, make_spread, take_spread
 
 Pool = ThreadPoolExecutor | None
 """Threads that share the work; None: one thread."""
 
-ANSWERS: Final = ("earliest", "most_likely", "latest", "probability")
 FEWEST_SAMPLED_PAIRS_FOR_THREADS: Final = 8
 """Fewer pairs stay on one thread: passing work to another costs as much as some of them."""
 
@@ -62,27 +63,8 @@ ENTRY = np.dtype(
     ]
 )
 
-FINEST_WITH_PLANES: Final = 1e-5
-"""Smallest `impact_tolerance` (m) with which probabilities come from cutting planes. Below it, as in the profile
-`exact`, each sample is followed to its impact."""
-
-FEWEST_SAMPLES: Final = 16
-"""Fewest samples of a pair that has only a part of `uncertainty_samples`."""
-
 Records = NDArray[np.void]
 Pairs = NDArray[np.int32]
-
-
-class Workspaces(NamedTuple):
-    """Scratch memory of one thread."""
-
-    exact: Workspace
-    planes: PlaneMemory
-
-
-def make_workspaces(samples: int) -> Workspaces:
-    """Make the scratch memory of one thread."""
-    return Workspaces(make_workspace(), make_plane_memory(samples))
 
 
 @kernel
@@ -90,7 +72,7 @@ def renew(entries: Any, pairs: Any, bodies: Any, spread: Spread, now: float, ren
     """Write the entries that still hold, then those of the pairs (P, 2) in which a body may be uncertain, into renewed.
 
     A pair also counts if a body's box is wide enough for uncertainty, because a body that declares some later within
-    that width starts no new search. Pairs with a plan do not count. Returns the number of entries.
+    that width starts no new search. Returns the number of entries.
     """
     n = 0
     motion = bodies.motion
@@ -101,8 +83,6 @@ def renew(entries: Any, pairs: Any, bodies: Any, spread: Spread, now: float, ren
             n += 1
     for k in range(pairs.shape[0]):
         i, j = pairs[k, 0], pairs[k, 1]
-        if bodies.planned[i] or bodies.planned[j]:
-            continue
         widened = motion[i].spread_0 + motion[i].spread_1 + motion[j].spread_0 + motion[j].spread_1 > 0.0
         if not (widened or is_uncertain(spread, i) or is_uncertain(spread, j)):
             continue
@@ -217,14 +197,13 @@ class UncertainPredictions(Stage):
         """
         if not step.profile.horizon > 0.0:
             return predictions
-        stated = np.flatnonzero(~step.roster.bodies.planned[slots].any(axis=1))  # plans have no errors
-        self._widen(step, predictions, slots, stated)
+        self._widen(step, predictions, slots, np.flatnonzero(~with_plans(step.roster.bodies, slots)))
         if not self.counts(step.profile):
             return _sorted(predictions)
-        answers, done = self._judge_urgent(step, slots[stated], predictions["lower"][stated], True, pool, budget)
+        answers, done = self._judge_urgent(step, slots, predictions["lower"], True, pool, budget)
         for name, column in zip(ANSWERS, answers.T, strict=True):
-            predictions[name][stated] = column
-        predictions["status"][stated[~done]] = PredictionStatus.UNRESOLVED
+            predictions[name] = column
+        predictions["status"][~done] = PredictionStatus.UNRESOLVED
         self.add_pairs(step, np.empty((0, 2), np.int32))
         known = pair_keys(predictions["id_a"], predictions["id_b"])
         entries = _without(self._near(step), np.concatenate([known, touching]))
@@ -261,11 +240,16 @@ class UncertainPredictions(Stage):
     def _with_bounded(self, step: StepContext, entries: Records, possible: Records) -> Records:
         """Add predictions of the pairs (ENTRY) that the declared bounds on accelerations allow to meet.
 
-        They are reported however improbable that is; their lower ends are safe. possible: predictions of some of them.
+        They are reported however improbable that is; their lower ends are safe. A body that follows its plan does not
+        accelerate otherwise. possible: predictions of some of them.
         """
-        if not self.spread.acceleration.any() or not len(entries):
+        if not self.spread.acceleration.any():
             return possible
-        slots, horizon, n = np.stack([entries["i"], entries["j"]], axis=1), step.profile.horizon, len(entries)
+        slots = np.stack([entries["i"], entries["j"]], axis=1)
+        alone = ~with_plans(step.roster.bodies, slots)
+        entries, slots, horizon, n = entries[alone], slots[alone], step.profile.horizon, np.count_nonzero(alone)
+        if not n:
+            return possible
         first = np.full(n, horizon)
         intervals = Intervals(slots, first, np.full(n, inf), np.zeros(n, PREDICTION["status"]))
         query, work = step.settings.impact, self._workspaces[0].exact
@@ -349,34 +333,9 @@ class UncertainPredictions(Stage):
     def _judge(self, step: StepContext, slots: Pairs, stated: bool, pool: Pool) -> NDArray[np.float64]:
         """Compute the answers (n, 4) for pairs of body slots (n, 2) on all threads; their number changes no answer."""
         p, sampling = step.profile, self._sampling(step, stated)
-        columns, multibody = sample_columns(p.uncertainty_samples), step.roster.multibody
 
         def part(slots: Pairs, work: Workspaces) -> tuple[NDArray[np.float64], int]:
-            answers, followed = np.full((len(slots), len(ANSWERS)), LEFT), 0
-
-            def follow(some: NDArray[np.bool_], divisor: int) -> int:
-                """Follow a part of the samples exactly for some of the pairs. Return the number of samples."""
-                if not some.any():
-                    return 0
-                fewer = normal_samples(max(p.uncertainty_samples // divisor, FEWEST_SAMPLES))
-                samples = sampling._replace(**fewer._asdict())
-                found = np.empty((np.count_nonzero(some), len(ANSWERS)))
-                count = impact_probabilities(multibody, self.spread, slots[some], step.now, samples, work.exact, found)
-                answers[some] = found
-                return int(count)
-
-            if p.impact_tolerance >= FINEST_WITH_PLANES:
-                exact, planes = work
-                followed = plane_probabilities(
-                    multibody, self.spread, slots, step.now, sampling, columns, planes, exact, answers
-                )
-            left = answers[:, PROBABILITY] == LEFT
-            if left.any():
-                divisors = np.empty(len(slots), np.uint8)
-                find_divisors(multibody, slots, p.horizon, divisors)
-                for divisor in (COSTLY_PARTS, SPINNING_PARTS, 1):
-                    followed += follow(left & (divisors == divisor), divisor)
-            return answers, followed
+            return pair_probabilities(step.roster.multibody, self.spread, slots, step.now, sampling, p, work)
 
         if len(self._workspaces[0].planes.times) != p.uncertainty_samples:
             self._workspaces = [make_workspaces(p.uncertainty_samples)]

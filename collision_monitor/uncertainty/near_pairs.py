@@ -44,8 +44,10 @@ def find_near(multibody: Any, spread: Any, entries: Any, now: float, nearness: N
 
 @inlined
 def _could_meet(multibody: Any, spread: Any, i: int, j: int, now: float, nearness: NearPairRange) -> bool:
-    """Whether the grown bounding spheres of bodies i and j meet. Accelerations count as growth."""
+    """Whether the grown bounding spheres of bodies i and j meet. Accelerations count as growth. Plans lead anywhere."""
     table, parts, bodies = multibody
+    if bodies.planned[i] or bodies.planned[j]:
+        return True
     sigmas, margin, horizon, stale_acceleration = nearness
     reach = bodies.motion[i].radius + bodies.motion[j].radius + margin
     if not reach < inf:

@@ -60,7 +60,8 @@ def plane_probabilities(
     """Write times (s after `now`) and probabilities of impact of pairs (P, 2) of body slots into answers (P, 4).
 
     An answer is NaN if neither body has declared an uncertainty, or if the pair is stated to pass and its probability
-    is below min_probability for certain. The probability is LEFT for pairs that `impact_probabilities` has to answer.
+    is below min_probability for certain. The probability is LEFT for pairs that `impact_probabilities` or
+    `planned_probabilities` has to answer.
     sampling: its own samples are not used; columns: sample_columns. `find_near` comes before it.
     sampling.only_screens: for pairs that are stated to pass, write a time before which bodies grown by safe_sigmas do
     not meet, the likeliest time of contact, and a bound on its probability, LEFT if unknown.
@@ -74,6 +75,9 @@ def plane_probabilities(
         i, j = pairs[k, 0], pairs[k, 1]
         answers[k, :] = nan
         if not (is_uncertain(spread, i) or is_uncertain(spread, j)):
+            continue
+        if bodies.planned[i] or bodies.planned[j]:
+            answers[k, EARLIEST], answers[k, MOST_LIKELY], answers[k, PROBABILITY] = 0.0, 0.0, LEFT
             continue
         has_mesh = body_has_mesh(table, parts, bodies.first_shape[i])
         has_mesh |= body_has_mesh(table, parts, bodies.first_shape[j])

@@ -154,7 +154,7 @@ def first_contact(multibody: Any, i: int, j: int, window: Window, tube: Tube, qu
 
 
 @device
-def _gap_at(multibody: Any, i: int, j: int, t: float, work: Any) -> float:
+def gap_at(multibody: Any, i: int, j: int, t: float, work: Any) -> float:
     """Signed distance (m) of the shapes of bodies i and j at t.
 
     Writes its direction into work.block[0], and the points where they touch, about both origins, into work.block[1:3].
@@ -182,13 +182,13 @@ def likely_contact(multibody: Any, i: int, j: int, t: float, horizon: float, que
 
     t: closest approach of their origins. The origin of a long wall may be closest long before it is touched.
     """
-    gap = _gap_at(multibody, i, j, t, work)
+    gap = gap_at(multibody, i, j, t, work)
     if gap <= query.margin:
         return t
     first = first_contact(multibody, i, j, Window(t, horizon), Tube(0.0, 0.0), query, work)
     if first < inf:
         return first
-    return horizon if _gap_at(multibody, i, j, horizon, work) < gap else t
+    return horizon if gap_at(multibody, i, j, horizon, work) < gap else t
 
 
 @inlined
@@ -248,7 +248,7 @@ def _lay_along(multibody: Any, i: int, j: int, tube: Tube, sampling: Sampling, w
         least = inf
         for node in range(GAP_NODES):
             at = horizon * node / (GAP_NODES - 1)
-            gap = _gap_at(multibody, i, j, at, work)
+            gap = gap_at(multibody, i, j, at, work)
             beta = (gap - sampling.query.margin) / max(tube.start + at * tube.growth, 1e-300)
             if beta < least:
                 t, least = at, beta
@@ -265,7 +265,7 @@ def _least_tolerance(multibody: Any, i: int, j: int, turning: Any, t: float, mar
     work.frame. work.joint: root of the covariance of position at t and of velocity.
     """
     bodies, L = multibody.bodies, work.joint
-    gap = _gap_at(multibody, i, j, 0.0, work) - margin
+    gap = gap_at(multibody, i, j, 0.0, work) - margin
     if gap <= 0.0:
         return inf
     variance = (L[0, 0] - t * L[3, 0]) ** 2 + t * t * (L[3, 1] ** 2 + L[3, 2] ** 2 + L[3, 3] ** 2)
@@ -289,7 +289,7 @@ def right_time(multibody: Any, spread: Any, i: int, j: int, t: float, sampling: 
     before, first = 0.0, t
     for _ in range(BISECTIONS):
         middle = 0.5 * (before + first)
-        if _gap_at(multibody, i, j, middle, work) > sampling.query.margin:
+        if gap_at(multibody, i, j, middle, work) > sampling.query.margin:
             before = middle
         else:
             first = middle
@@ -322,7 +322,7 @@ def _set_mirror(multibody: Any, i: int, j: int, t: float, turning: Any, yaw_only
     """
     block, mirror = work.block, sides.widening[0]
     _set_unit_turns(t, turning, yaw_only, work, sides)
-    _gap_at(multibody, i, j, t, work)
+    gap_at(multibody, i, j, t, work)
     set_widening(block[0], block[1:3], sides.turns, work.joint, work.frame, mirror)
     length = _length(mirror)
     for c in range(DIMENSIONS):
@@ -376,7 +376,7 @@ def _set_sides(
         B.x = x + a * F[0, 0] + b * F[1, 0] + c * F[2, 0]
         B.y = y + a * F[0, 1] + b * F[1, 1] + c * F[2, 1]
         B.z = z + a * F[0, 2] + b * F[1, 2] + c * F[2, 2]
-        _gap_at(multibody, i, j, t, work)
+        gap_at(multibody, i, j, t, work)
         set_widening(block[0], block[1:3], sides.turns, L, F, sides.widening[side])
     B.x, B.y, B.z = x, y, z
     set_limits(points, times, first, middle, sides)

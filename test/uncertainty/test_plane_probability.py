@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import collision_monitor as cm
-from collision_monitor.monitor import uncertain_predictions
+from collision_monitor.monitor import pair_probabilities
 from collision_monitor.monitor.uncertain_predictions import sigmas_for
 from collision_monitor.records import STATE
 from collision_monitor.settings.profile import Profile
@@ -258,6 +258,6 @@ def test_another_number_of_samples_is_possible() -> None:
         rows = np.zeros(0, STATE)
         reported = monitor.step(0, rows).predictions
         answers.append(float(reported["probability"][0]) if len(reported) else 0.0)
-    assert uncertain_predictions.ANSWERS[3] == "probability"
+    assert pair_probabilities.ANSWERS[3] == "probability"
     assert answers[0] == answers[3]
     assert np.ptp(answers) < 0.05

@@ -37,6 +37,7 @@ class Workspace(NamedTuple):
     axes: Any  # (AXES, 4): directions that separated the bodies in other samples
     sides: Any  # (1,) SIDES: what foretells the outcomes of samples
     sample: Any  # (DIMENSIONS,): unit errors of one sample
+    errors: Any  # (2, 12): errors of both bodies in one sample, see planned_impacts.py
     scratch: Scratch
 
 
@@ -52,6 +53,7 @@ def make_workspace() -> Workspace:
         np.zeros((AXES, 4)),
         np.zeros(1, SIDES),
         np.zeros(DIMENSIONS),
+        np.zeros((2, 12)),
         make_scratch(),
     )
 
