@@ -98,7 +98,9 @@ def _step_uncertain(monitor: Monitor, poses: Array, seconds: int) -> None:
     monitor.add(2, Sphere(0.5), max_linear_acceleration=1.0, replace=True)
     monitor.step(stamp + 10_000_000, states, covariance=np.zeros((len(poses), 12)))
     states["orientation_stddev"] = 1.0  # too large for planes: every sample is followed
+    monitor.follow(2, Trajectory([0, 1], poses[[0, 0]]))
     monitor.step(stamp + 20_000_000, states)
+    monitor.follow(2, None)
 
 
 def _step_bounded_meshes(monitor: Monitor) -> None:
