@@ -75,7 +75,8 @@ PREDICTION = np.dtype(
         ("model_a", "u1"),
         ("model_b", "u1"),
         ("stale", "u1"),
-        ("reserved", "u1", 3),
+        ("plans", "u1"),
+        ("reserved", "u1", 2),
     ]
 )
 
@@ -131,6 +132,15 @@ class PredictionStatus(IntEnum):
     HIT = 0
     UNRESOLVED = 1
     POSSIBLE = 2
+
+
+class PlanFlag(IntFlag):
+    """Bits of `PredictedCollision.plans`: which of the two follows its plan, and which left the last one it had."""
+
+    FOLLOWS_A = 1
+    FOLLOWS_B = 2
+    LEFT_A = 4
+    LEFT_B = 8
 
 
 class Method(IntEnum):

@@ -333,7 +333,7 @@ def write_predictions(
         stale_i = not bodies.static[i] and now - bodies.time[i] > stale_after
         stale_j = not bodies.static[j] and now - bodies.time[j] > stale_after
         row.stale = 1 if stale_i or stale_j else 0
-        row.reserved[0] = row.reserved[1] = row.reserved[2] = 0
+        row.plans = row.reserved[0] = row.reserved[1] = 0
         n += 1
     return n
 

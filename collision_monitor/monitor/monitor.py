@@ -161,7 +161,8 @@ class Monitor(Stages):
         A new plan replaces the one before; None ends it. stamp_ns: time 0 of the plan; by default the last step, or the
         first one if there was none. A body that leaves its plan, which `StepResult.left` says, goes on as its last
         state says, and so does one whose plan is over. Its contacts are those of its states. While it follows a plan,
-        its declared errors and bounds do not count; its tube does, which is as wide as it is off its plan.
+        declared bounds on its acceleration do not count, nor does the error of its velocity; its tube does, which is as
+        wide as it is off its plan.
         Raises InputError for an unknown or static object, a plan that is over or unknown after its end, and a tolerance
         that is no Tolerance of numbers from 0.
         """
@@ -312,7 +313,9 @@ class Monitor(Stages):
         if self._uncertain.active:
             touching, pool = self._active_pairs.touching_keys, self._first_impacts.pool
             predictions = self._uncertain.complete(step, predictions, slots, touching, pool, budget)
-        return self._answers.filtered(step, predictions)
+        predictions = self._answers.filtered(step, predictions)
+        self._plans.mark(step.roster, predictions)
+        return predictions
 
     # ------------------------------------------------------------------ snapshots
 

@@ -45,6 +45,7 @@ from collision_monitor.motion.motion import (
 )
 from collision_monitor.motion.stated_motion import ACCELERATION, ANGULAR, COURSE, LINEAR, REST
 from collision_monitor.motion.trajectory import Tolerance, Trajectory
+from collision_monitor.records import PlanFlag
 from collision_monitor.shapes.pose import rotation_matrix
 from collision_monitor.uncertainty.spread import surface_spread, swing_radius
 
@@ -101,11 +102,12 @@ NOBODY: Final[Slots] = np.zeros(0, np.int32)
 class Plans(Stage):
     """The plans in force, one of a body at most."""
 
-    SAVED = ("_rows", "_pieces")
+    SAVED = ("_rows", "_pieces", "_left")
 
     def __init__(self) -> None:
         self._rows: NDArray[np.void] = np.zeros(0, PLAN)
         self._pieces: NDArray[np.void] = np.zeros(0, MOTION)
+        self._left: NDArray[np.uint32] = np.zeros(0, np.uint32)  # ids of the bodies that left the last plan they had
 
     @property
     def slots(self) -> Slots:
@@ -158,10 +160,13 @@ class Plans(Stage):
             bodies.planned[i], bodies.motion["until"][i] = False, inf
             roster.renewed.add(int(i))
         self._rows = self._rows[~gone]
+        if len(self._left):
+            self._left = np.setdiff1d(self._left, roster.bodies.id[slots])
 
     def forget(self, roster: Roster) -> None:
         """Drop all plans."""
         self.drop(roster, self.slots)
+        self._left = self._left[:0]
 
     # ------------------------------------------------------------------ the step
 
@@ -180,6 +185,7 @@ class Plans(Stage):
         slots = self.slots
         left: Slots = slots[verdicts == LEFT]
         self.drop(roster, slots[verdicts != FOLLOWS])
+        self._left = np.union1d(self._left, roster.bodies.id[left])
         renewed = np.isin(self._rows["slot"], list(roster.renewed))
         self._rows["fresh"] |= renewed
         roster.renewed.difference_update(self._rows["slot"][renewed].tolist())
@@ -217,6 +223,13 @@ class Plans(Stage):
         n, m = renew_plans(step.roster.bodies, uncertainty, rows, which, grid, seconds, settings, found)
         return found[0, :n], found[1, :m]
 
+    def mark(self, roster: Roster, predictions: NDArray[np.void]) -> None:
+        """Write to predictions (records.PREDICTION) which of their bodies follow plans, and which left theirs."""
+        for ids, flag in ((roster.bodies.id[self.slots], PlanFlag.FOLLOWS_A), (self._left, PlanFlag.LEFT_A)):
+            if len(ids):
+                of_a, of_b = (np.isin(predictions[name], ids) for name in ("id_a", "id_b"))
+                predictions["plans"] |= (flag * of_a + 2 * flag * of_b).astype(np.uint8)
+
     # ------------------------------------------------------------------ snapshots
 
     def save(self, snapshot: Snapshot, facts: Facts) -> None:
@@ -224,12 +237,13 @@ class Plans(Stage):
         rows = self._rows.copy()
         kept = np.zeros(int(rows["count"].sum()), MOTION)
         _move(rows, self._pieces, kept, None)
-        snapshot.arrays.update({"plans.rows": rows, "plans.pieces": kept})
+        snapshot.arrays.update({"plans.rows": rows, "plans.pieces": kept, "plans.left": self._left})
 
     def restore(self, snapshot: Snapshot, facts: Facts) -> None:
         """See Stage. `attach` lets the bodies follow them."""
         self._rows = snapshot.array("plans.rows", np.zeros(0, PLAN))
         self._pieces = snapshot.array("plans.pieces", np.zeros(0, MOTION))
+        self._left = snapshot.array("plans.left", np.zeros(0, np.uint32))
         rows, pieces = self._rows, self._pieces
         check_range("plans.rows", rows["slot"], 0, len(snapshot.arrays["bodies.used"]))
         check_range("plans.rows", rows["count"], 1, len(pieces) + 1)

@@ -155,6 +155,28 @@ def test_a_body_that_leaves_its_plan_goes_on_as_its_state_says() -> None:
     assert monitor.step(4 * STEP, late).left == (2,)
 
 
+def test_predictions_name_who_follows_a_plan_and_who_left_it() -> None:
+    monitor = cm.Monitor(cm.Profile(horizon=5.0))
+    for k in (1, 2, 3):
+        monitor.add(k, cm.Sphere(0.3))
+    rows = np.zeros(3, STATE)
+    rows["id"], rows["quaternion"][:, 3] = (1, 2, 3), 1.0
+    rows["position"][:, 0], rows["linear"][:, 0] = (0.0, 2.0, 4.0), (0.5, 0.0, -0.5)
+    monitor.follow(2, cm.Trajectory([0.0, 9.0], [(2.0, 0.0, 0.0)] * 2))
+    plans = [monitor.step(0, rows).predictions]
+    rows["position"][1, 1] = 0.3
+    plans += [monitor.step(STEP, rows).predictions, monitor.step(2 * STEP, rows).predictions]
+    monitor = cm.Monitor.restored(monitor.profile, Snapshot.decode(monitor.snapshot().encode()))
+    plans.append(monitor.step(3 * STEP, rows).predictions)
+    monitor.follow(3, cm.Trajectory([0.0, 5.0], [(4.0, 0.0, 0.0), (1.5, 0.0, 0.0)]), stamp_ns=0)
+    monitor.follow(2, None)
+    plans.append(monitor.step(4 * STEP, rows).predictions)
+    found = [{(int(row["id_a"]), int(row["id_b"])): int(row["plans"]) for row in each} for each in plans]
+    follows, left = ({(1, 2): 2, (2, 3): 1, (1, 3): 0}, {(1, 2): 8, (2, 3): 4, (1, 3): 0})
+    assert found[:4] == [follows, left, left, left]
+    assert found[4] == {(1, 2): 0, (2, 3): 2, (1, 3): 2}
+
+
 def test_a_body_that_turns_away_from_its_plan_leaves_it() -> None:
     monitor, turns = crossing()
     rows = moving(states([1, 2], turns, 0.0))
