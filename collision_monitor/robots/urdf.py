@@ -15,6 +15,9 @@ from numpy.typing import NDArray
 from collision_monitor.settings.xml_tree import Element, parse_xml
 from collision_monitor.shapes.pose import Pose, from_rotation_vector, multiply
 
+LONGEST_LINK_NAME: Final = 256
+"""Characters of the name of a link or a joint."""
+
 MOST_LINKS: Final = 2000
 """Links of a robot. Humanoids with hands have 100."""
 
@@ -98,6 +101,8 @@ def parse_urdf(text: str | bytes, name: str) -> Urdf:
 
 
 def _put(found: dict[str, Any], each: Any, element: Element) -> None:
+    if len(each.name) > LONGEST_LINK_NAME:
+        raise element.error(f"name: expected at most {LONGEST_LINK_NAME} characters, got {len(each.name)}")
     if each.name in found:
         raise element.error(f"expected a name of its own, got that of {found[each.name].element.where}")
     found[each.name] = each

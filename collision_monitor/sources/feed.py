@@ -11,6 +11,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from collision_monitor import records
 from collision_monitor.codec import Change, encode_descriptions, encode_states
 from collision_monitor.errors import InputError
 from collision_monitor.monitor.state.timeline import Progress
@@ -40,6 +41,11 @@ LISTEN_PERIOD: Final = 100_000_000
 
 MOST_TRANSFORMS: Final = 10_000
 """Transforms of a message, 0.1 s. A robot sends 100."""
+
+MOST_BRIDGED: Final = 100
+"""Steps without states in a silence of all topics, one each MAX_TIME_STEP, 0.1 s."""
+
+_LONGEST_STEP: Final = round(MAX_TIME_STEP * 1e9)
 
 _JUMP: Final = (
     f"stamp: expected one within {MAX_TIME_STEP:g} s of the others, got one further away: another clock, "
@@ -90,6 +96,7 @@ class Feed:
         self._failures: list[SourceFailure] = []
         self._asked: frozenset[str] = frozenset()
         self._listened = 0
+        self._stepped: int | None = None  # stamp of the last step, ns; None before the first one of this time
         stale = [entry.name for entry in mapping.sources if entry.static or entry.shapes]
         self.silence = SilentTopics(mapping.max_age, stale)
         self._standing = StandingObjects([entry for entry in mapping.sources if entry.static and not entry.topic])
@@ -342,7 +349,8 @@ class Feed:
             self._settle(at)
         yield from self._changes(raw.received)
         if at is not None:
-            yield from (self._states(step, raw.received) for step in self._due(at))
+            for step in self._due(at):
+                yield from (self._states(each, raw.received) for each in (*self._bridge(step.stamp_ns), step))
 
     def _give(self, topic: str, content: Any, sources: list[Source], stamp: int) -> None:
         """Let each source take a message. A line that it leaves without anything of use is listed as not monitored."""
@@ -366,6 +374,7 @@ class Feed:
 
     def _restart(self, stamp: int) -> None:
         """Let everything that holds a stamp begin anew."""
+        self._stepped = None
         self.scene.restart()
         for source in self._sources:
             with self.scene.guard(source.name):
@@ -381,6 +390,17 @@ class Feed:
         yield waiting.at(at)
         for object_id in waiting.too_old:
             self.scene.refuse_old(object_id)
+
+    def _bridge(self, stamp: int) -> Iterator[Step]:
+        """Yield steps without states up to one after a long silence, whose stamp the monitor would take for a jump.
+
+        A silence that is longer than MOST_BRIDGED steps is one: the monitor begins anew behind it.
+        """
+        last = self._stepped
+        self._stepped = stamp if last is None else max(last, stamp)
+        between = range(stamp if last is None else last + _LONGEST_STEP, stamp, _LONGEST_STEP)
+        for each in between if len(between) <= MOST_BRIDGED else (stamp - 1,):
+            yield Step(each, np.zeros(0, records.STATE), None)
 
     def _changes(self, received: int) -> Iterator[Input]:
         if changes := self.scene.take_changes():
