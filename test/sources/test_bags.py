@@ -406,6 +406,23 @@ def test_the_metadata_count_what_was_recorded(tmp_path: Path, storage: StoragePl
         read(folder)
 
 
+@pytest.mark.parametrize(
+    "topics", [None, "x", ["x"], [None], [[]], [{}], [{"topic_metadata": "x"}], [{"topic_metadata": {"name": []}}]]
+)
+def test_metadata_of_other_types_state_nothing(tmp_path: Path, topics: Any) -> None:
+    folder = write_bag(tmp_path / "bag", messages())
+    change_yaml(folder, lambda table: table.update(topics_with_message_count=topics))
+    assert len(read(folder)) == 40
+
+
+@pytest.mark.parametrize("names", [[None], [""], [".."], ["."], ["a\0b"], ["x" * 5000], [{}], [["a"]], "ab", 7, ["/"]])
+def test_names_that_no_file_of_the_bag_has_are_refused(tmp_path: Path, names: Any) -> None:
+    folder = write_bag(tmp_path / "bag", messages())
+    change_yaml(folder, lambda table: table.update(relative_file_paths=names))
+    with pytest.raises(SessionError, match="expected (a file of the bag|the relative_file_paths of a bag)"):
+        read(folder)
+
+
 @pytest.mark.parametrize("storage", list(StoragePlugin))
 def test_an_empty_topic_beside_static_objects(tmp_path: Path, storage: StoragePlugin) -> None:
     """The error names what is missing, and not the static object."""
