@@ -13,7 +13,7 @@ import numpy as np
 
 from collision_monitor import records
 from collision_monitor.codec import Change, encode_descriptions, encode_states
-from collision_monitor.errors import InputError
+from collision_monitor.errors import InputError, MessageError
 from collision_monitor.monitor.state.timeline import Progress
 from collision_monitor.pipeline.topics import Topic
 from collision_monitor.sources.failures import MOST_KEPT_FAILURES, SourceFailure, source_failure
@@ -102,6 +102,7 @@ class Feed:
         self._standing = StandingObjects([entry for entry in mapping.sources if entry.static and not entry.topic])
         self._sources: list[Source] = [self._standing]
         self._by_topic: dict[str, list[Source]] = {}
+        self._types: dict[str, dict[str, None]] = {}  # by topic, those that its sources take
         self.owners: dict[str, str] = {}
         for name, content in mapping.sections.items():
             for source in SECTIONS[name](content, mapping):
@@ -151,6 +152,7 @@ class Feed:
         self._sources.append(source)
         for topic in topics:
             self._by_topic.setdefault(topic, []).append(source)
+            self._types.setdefault(topic, {}).update(dict.fromkeys(source.topics.get(topic, ())))
 
     @cached_property
     def _lines(self) -> dict[str, list[str]]:
@@ -207,6 +209,7 @@ class Feed:
         """Return the inputs that a message becomes. content: as decoded, or the exception that the decoder raised."""
         found: list[Input] = []
         self._prepare(raw.received)
+        content = self._of_type(raw, content)
         with np.errstate(all="ignore"), self.scene.guard(raw.topic):  # numbers that are none: the monitor refuses them
             if isinstance(content, Exception):
                 raise content
@@ -265,6 +268,13 @@ class Feed:
         """List the lines whose topics are silent by now."""
         for each in self.silence.find(now_ns):
             self.scene.unmonitored.lacks(each.line, each.topic, each.reason, each.last_ns)
+
+    def _of_type(self, raw: RawMessage, content: Any) -> Any:
+        """Return the content; a MessageError in place of that of a type that no source of the topic takes."""
+        expected = self._types.get(raw.topic)
+        if not expected or raw.type in expected:
+            return content
+        return MessageError(f"expected {' or '.join(expected)}, got {raw.type:.80}")
 
     def _inputs(self, raw: RawMessage, content: Any) -> Iterator[Input]:
         if raw.type == TRANSFORMS:
