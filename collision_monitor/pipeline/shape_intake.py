@@ -118,7 +118,7 @@ class ShapeIntake:
         return change
 
     def _describe_box(self, change: ObjectDescription, boxes: Budget) -> None:
-        """Describe an object by its box. `boxes` is used in the same way live and in a replay of what was taken then."""
+        """Describe an object by its box. `boxes` is used in the same way live and in a replay of what was taken."""
         if not (boxes.fits(change.shapes, Model.AABB) and self._described_within(boxes, change)):
             self._monitor.describe(change, bounding_box_model(change.shapes))
 

@@ -110,7 +110,8 @@ def _refuse_xacro(robot: Element) -> None:
     left = [robot]
     while left:
         element = left.pop()
-        if element.tag.startswith("xacro:") or any("${" in text or "$(" in text for text in element.attributes.values()):
+        texts = element.attributes.values()
+        if element.tag.startswith("xacro:") or any("${" in text or "$(" in text for text in texts):
             raise element.error("expected a URDF, got a xacro file; convert it with `xacro FILE > ROBOT.urdf`")
         left += reversed([each for each in element.children if each.tag in _READ or each.tag.startswith("xacro:")])
 

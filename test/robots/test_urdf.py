@@ -125,7 +125,7 @@ BOX = '<geometry><box size="1 1 1"/></geometry>'
 )
 def test_what_is_left_of_a_xacro_file_is_no_urdf(left: str) -> None:
     """A macro that nobody replaced may be a shape, which would not be monitored."""
-    with pytest.raises(InputError, match="line 7, <[a-z:]+.*>: expected a URDF, got a xacro file; convert it with"):
+    with pytest.raises(InputError, match=r"line 7, <[a-z:]+.*>: expected a URDF, got a xacro file; convert it with"):
         parse_urdf(TWO.format("", left), "robot.urdf")
     ignored = '<gazebo><plugin filename="$(find x)"/></gazebo><link name="c"><visual name="${x}"/></link>'
     assert "c" in parse_urdf(TWO.format("", ignored), "robot.urdf").links

@@ -419,7 +419,7 @@ def test_metadata_of_other_types_state_nothing(tmp_path: Path, topics: Any) -> N
 def test_names_that_no_file_of_the_bag_has_are_refused(tmp_path: Path, names: Any) -> None:
     folder = write_bag(tmp_path / "bag", messages())
     change_yaml(folder, lambda table: table.update(relative_file_paths=names))
-    with pytest.raises(SessionError, match="expected (a file of the bag|the relative_file_paths of a bag)"):
+    with pytest.raises(SessionError, match=r"expected (a file of the bag|the relative_file_paths of a bag)"):
         read(folder)
 
 

@@ -13,8 +13,8 @@ from collision_monitor.errors import InputError
 from collision_monitor.monitor.state.timeline import Order, Progress, Timeline
 
 MAX_TIME_STEP: Final = 10.0
-"""s by which a stamp may jump; a larger jump needs a second message, as in the monitor. A stamp ahead may jump by what has
-passed since the last message besides, by the clock of receipt."""
+"""s by which a stamp may jump; a larger jump needs a second message, as in the monitor. A stamp ahead may jump by what
+has passed since the last message besides, by the clock of receipt."""
 
 PATIENCE: Final = 0.5
 """s that a publisher with earlier stamps must go on before its time counts."""
