@@ -3,10 +3,29 @@
 from __future__ import annotations
 
 from enum import Enum
+from typing import Final
+
+LONGEST_ERROR: Final = 2000
+"""Characters of an error: a value from a hostile file that it quotes can have a million."""
+
+
+def one_line(text: str) -> str:
+    """Return a text that may quote a file or a message as one line that can be shown, shortened in its middle.
+
+    What it quotes can be neither a further line of a log, nor a control sequence of a terminal, nor half a letter.
+    """
+    if len(text) > LONGEST_ERROR:
+        text = f"{text[: LONGEST_ERROR // 2]} [...] {text[-LONGEST_ERROR // 2 :]}"
+    if text.isprintable():
+        return text
+    return "".join(it if it.isprintable() else it.encode("unicode_escape").decode() for it in text)
 
 
 class CollisionMonitorError(Exception):
-    """Base class of all errors that this package raises on purpose, with a text for users."""
+    """Base class of all errors that this package raises on purpose, with a text of one line for users."""
+
+    def __str__(self) -> str:
+        return one_line(super().__str__())
 
 
 class InputError(CollisionMonitorError, ValueError):

@@ -63,59 +63,64 @@ class ShapeIntake:
         implied = len(changes) - len(message.objects)
         budgets, made, coarse = (Budget(), Budget(BOXES_MS)), [], []
         for k, change in enumerate(changes):
-            taken = self._apply(change, message.stamp_ns, budgets, ready)
-            if taken is not None:
-                made.append(taken)
-                if taken is not change:
-                    coarse.append(message.model_at[k - implied])
+            tried, is_made = self._apply(change, message.stamp_ns, budgets, ready)
+            if is_made:
+                made.append(tried)
+            if tried is not change:  # also if it was refused, so that a replay refuses it for the same reason
+                coarse.append(message.model_at[k - implied])
         return TakenShapes(made, _with_model(data, coarse, Model.AABB) if coarse else data)
 
-    def _apply(self, change: Change, stamp_ns: int, budgets: Budgets, ready: Modelled | None) -> Change | None:
-        """Change the monitor and then the catalogue. Return the change as it was made; None: it was refused."""
+    def _apply(self, change: Change, stamp_ns: int, budgets: Budgets, ready: Modelled | None) -> tuple[Change, bool]:
+        """Change the monitor and then the catalogue. Return the change as it was tried, and whether it was made."""
         was_known = False
         try:
             if isinstance(change, Removal):
                 self._monitor.remove(change.object_id)
             else:
                 was_known = change.object_id in self._monitor
-                change = self._describe(change, stamp_ns, budgets, ready)
+                own, boxes = budgets
+                boxed = self._describe(change, stamp_ns, own, ready)
+                if boxed is not None:
+                    change = boxed
+                    self._describe_box(boxed, boxes)
         except Exception as error:  # see `reason_of`
             if not isinstance(change, Removal):  # removing an unknown object is no error
                 self._monitor.refuse(Refusal.SHAPE, _about(change.object_id, reason_of(error)))
                 if not was_known:  # an unexpected error may have left it in the monitor, but not in the catalogue
                     with suppress(InputError):
                         self._monitor.remove(change.object_id)
-            return None
+            return change, False
         self._catalogue.apply(change)
-        return change
+        return change, True
 
     def _describe(
-        self, change: ObjectDescription, stamp_ns: int, budgets: Budgets, ready: Modelled | None
-    ) -> ObjectDescription:
-        """Describe an object in the time that is left. Return the description that was taken.
+        self, change: ObjectDescription, stamp_ns: int, own: Budget, ready: Modelled | None
+    ) -> ObjectDescription | None:
+        """Describe an object in the time that is left. Return what is to be described by its box instead, or None.
 
-        The second budget, that of the boxes, is used in the same way live and in a replay, where `change` is what was
-        taken then. The first one is for the live monitor alone.
+        own: for the live monitor alone.
         """
         if is_quick(change.shapes):
             self._monitor.describe(change, ready)
-            return change
-        own, boxes = budgets
+            return None
         model = self._monitor.model_of(change)
         if model is not Model.AABB:
             if ready is None and self._preparation is not None:
                 if own.fits(change.shapes, model) and self._described_within(own, change):
-                    return change
+                    return None
                 ready = self._preparation.result(change, model)
             if ready is not None or self._preparation is None:
                 self._monitor.describe(change, ready)
-                return change
+                return None
             coarse = dataclasses.replace(change, model=Model.AABB)
             self._preparation.start(self._job(change, coarse, stamp_ns, model))
-            change = coarse
+            return coarse
+        return change
+
+    def _describe_box(self, change: ObjectDescription, boxes: Budget) -> None:
+        """Describe an object by its box. `boxes` is used in the same way live and in a replay of what was taken."""
         if not (boxes.fits(change.shapes, Model.AABB) and self._described_within(boxes, change)):
             self._monitor.describe(change, bounding_box_model(change.shapes))
-        return change
 
     def _described_within(self, budget: Budget, change: ObjectDescription) -> bool:
         """Describe an object; return False if that needs more exact arithmetic than the budget allows."""

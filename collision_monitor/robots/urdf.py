@@ -15,6 +15,15 @@ from numpy.typing import NDArray
 from collision_monitor.settings.xml_tree import Element, parse_xml
 from collision_monitor.shapes.pose import Pose, from_rotation_vector, multiply
 
+_READ: Final = (
+    *("link", "joint", "collision", "geometry", "origin", "box", "sphere", "cylinder", "capsule", "mesh"),
+    *("parent", "child", "axis", "mimic"),
+)
+"""Elements that are read."""
+
+LONGEST_LINK_NAME: Final = 256
+"""Characters of the name of a link or a joint."""
+
 MOST_LINKS: Final = 2000
 """Links of a robot. Humanoids with hands have 100."""
 
@@ -84,8 +93,7 @@ def parse_urdf(text: str | bytes, name: str) -> Urdf:
     robot = parse_xml(text, name)
     if robot.tag != "robot":
         raise robot.error("expected a URDF with <robot> as its outermost element")
-    if any(":" in child.tag and child.tag.startswith("xacro:") for child in robot.children):
-        raise robot.error("expected a URDF, got a xacro file; convert it with `xacro FILE > ROBOT.urdf`")
+    _refuse_xacro(robot)
     links: dict[str, Link] = {}
     for element in robot.all("link"):
         _put(links, _link(element), element)
@@ -97,7 +105,20 @@ def parse_urdf(text: str | bytes, name: str) -> Urdf:
     return Urdf(robot.attributes.get("name", "robot"), links, joints)
 
 
+def _refuse_xacro(robot: Element) -> None:
+    """Raise InputError for macros and expressions that are left: they stand for links, shapes and names."""
+    left = [robot]
+    while left:
+        element = left.pop()
+        texts = element.attributes.values()
+        if element.tag.startswith("xacro:") or any("${" in text or "$(" in text for text in texts):
+            raise element.error("expected a URDF, got a xacro file; convert it with `xacro FILE > ROBOT.urdf`")
+        left += reversed([each for each in element.children if each.tag in _READ or each.tag.startswith("xacro:")])
+
+
 def _put(found: dict[str, Any], each: Any, element: Element) -> None:
+    if len(each.name) > LONGEST_LINK_NAME:
+        raise element.error(f"name: expected at most {LONGEST_LINK_NAME} characters, got {len(each.name)}")
     if each.name in found:
         raise element.error(f"expected a name of its own, got that of {found[each.name].element.where}")
     found[each.name] = each
@@ -106,10 +127,10 @@ def _put(found: dict[str, Any], each: Any, element: Element) -> None:
 def _link(element: Element) -> Link:
     collisions = []
     for collision in element.all("collision"):
-        geometry = collision.first("geometry")
-        if geometry is None or not geometry.children:
+        shapes = [shape for geometry in collision.all("geometry") for shape in geometry.children]
+        if not shapes:
             raise collision.error("expected <geometry> with a shape in it, got none")
-        collisions.append(Collision(geometry.children[0], _origin(collision)))
+        collisions += [Collision(shape, _origin(collision)) for shape in shapes]  # the format has one; none is left out
     return Link(element.text("name"), tuple(collisions), element)
 
 

@@ -49,7 +49,7 @@ class Element:
         if not value:
             if key in self.attributes:
                 raise self.error(f"{key}: expected a value, got an empty text")
-            raise self.error(f"expected an attribute {key}, got {', '.join(self.attributes) or 'no attribute'}")
+            raise self.error(f"expected an attribute {key}, got {', '.join(self.attributes) or 'no attribute':.200}")
         return value
 
     def number(self, key: str, default: float | None = None) -> float:
@@ -64,6 +64,8 @@ class Element:
             return np.array(default, np.float64)
         value = self.text(key)
         try:
+            if "_" in value or not value.isascii():  # which only Python reads
+                raise ValueError
             numbers = np.array([float(word) for word in value.split()])
         except ValueError:
             numbers = np.zeros(0)
@@ -88,6 +90,8 @@ def parse_xml(text: str | bytes, name: str, *, largest: int = LARGEST_TEXT, cont
     except expat.ExpatError as error:
         reason = expat.ErrorString(error.code)
         raise InputError(f"{name}, line {error.lineno}: expected XML, got: {reason}") from None
+    except InputError:
+        raise
     except (UnicodeError, ValueError) as error:
         raise InputError(f"{name}: expected XML, got: {error!s:.200}") from None
     return builder.root.children[0]

@@ -11,8 +11,9 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from collision_monitor import records
 from collision_monitor.codec import Change, encode_descriptions, encode_states
-from collision_monitor.errors import InputError
+from collision_monitor.errors import InputError, MessageError
 from collision_monitor.monitor.state.timeline import Progress
 from collision_monitor.pipeline.topics import Topic
 from collision_monitor.sources.failures import MOST_KEPT_FAILURES, SourceFailure, source_failure
@@ -40,6 +41,11 @@ LISTEN_PERIOD: Final = 100_000_000
 
 MOST_TRANSFORMS: Final = 10_000
 """Transforms of a message, 0.1 s. A robot sends 100."""
+
+MOST_BRIDGED: Final = 100
+"""Steps without states in a silence of all topics, one each MAX_TIME_STEP, 0.1 s."""
+
+_LONGEST_STEP: Final = round(MAX_TIME_STEP * 1e9)
 
 _JUMP: Final = (
     f"stamp: expected one within {MAX_TIME_STEP:g} s of the others, got one further away: another clock, "
@@ -90,11 +96,13 @@ class Feed:
         self._failures: list[SourceFailure] = []
         self._asked: frozenset[str] = frozenset()
         self._listened = 0
+        self._stepped: int | None = None  # stamp of the last step, ns; None before the first one of this time
         stale = [entry.name for entry in mapping.sources if entry.static or entry.shapes]
         self.silence = SilentTopics(mapping.max_age, stale)
         self._standing = StandingObjects([entry for entry in mapping.sources if entry.static and not entry.topic])
         self._sources: list[Source] = [self._standing]
         self._by_topic: dict[str, list[Source]] = {}
+        self._types: dict[str, dict[str, None]] = {}  # by topic, those that its sources take
         self.owners: dict[str, str] = {}
         for name, content in mapping.sections.items():
             for source in SECTIONS[name](content, mapping):
@@ -144,6 +152,7 @@ class Feed:
         self._sources.append(source)
         for topic in topics:
             self._by_topic.setdefault(topic, []).append(source)
+            self._types.setdefault(topic, {}).update(dict.fromkeys(source.topics.get(topic, ())))
 
     @cached_property
     def _lines(self) -> dict[str, list[str]]:
@@ -200,6 +209,7 @@ class Feed:
         """Return the inputs that a message becomes. content: as decoded, or the exception that the decoder raised."""
         found: list[Input] = []
         self._prepare(raw.received)
+        content = self._of_type(raw, content)
         with np.errstate(all="ignore"), self.scene.guard(raw.topic):  # numbers that are none: the monitor refuses them
             if isinstance(content, Exception):
                 raise content
@@ -258,6 +268,13 @@ class Feed:
         """List the lines whose topics are silent by now."""
         for each in self.silence.find(now_ns):
             self.scene.unmonitored.lacks(each.line, each.topic, each.reason, each.last_ns)
+
+    def _of_type(self, raw: RawMessage, content: Any) -> Any:
+        """Return the content; a MessageError in place of that of a type that no source of the topic takes."""
+        expected = self._types.get(raw.topic)
+        if not expected or raw.type in expected:
+            return content
+        return MessageError(f"expected {' or '.join(expected)}, got {raw.type:.80}")
 
     def _inputs(self, raw: RawMessage, content: Any) -> Iterator[Input]:
         if raw.type == TRANSFORMS:
@@ -342,7 +359,8 @@ class Feed:
             self._settle(at)
         yield from self._changes(raw.received)
         if at is not None:
-            yield from (self._states(step, raw.received) for step in self._due(at))
+            for step in self._due(at):
+                yield from (self._states(each, raw.received) for each in (*self._bridge(step.stamp_ns), step))
 
     def _give(self, topic: str, content: Any, sources: list[Source], stamp: int) -> None:
         """Let each source take a message. A line that it leaves without anything of use is listed as not monitored."""
@@ -366,6 +384,7 @@ class Feed:
 
     def _restart(self, stamp: int) -> None:
         """Let everything that holds a stamp begin anew."""
+        self._stepped = None
         self.scene.restart()
         for source in self._sources:
             with self.scene.guard(source.name):
@@ -381,6 +400,17 @@ class Feed:
         yield waiting.at(at)
         for object_id in waiting.too_old:
             self.scene.refuse_old(object_id)
+
+    def _bridge(self, stamp: int) -> Iterator[Step]:
+        """Yield steps without states up to one after a long silence, whose stamp the monitor would take for a jump.
+
+        A silence that is longer than MOST_BRIDGED steps is one: the monitor begins anew behind it.
+        """
+        last = self._stepped
+        self._stepped = stamp if last is None else max(last, stamp)
+        between = range(stamp if last is None else last + _LONGEST_STEP, stamp, _LONGEST_STEP)
+        for each in between if len(between) <= MOST_BRIDGED else (stamp - 1,):
+            yield Step(each, np.zeros(0, records.STATE), None)
 
     def _changes(self, received: int) -> Iterator[Input]:
         if changes := self.scene.take_changes():

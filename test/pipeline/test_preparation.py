@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from collision_monitor import ConvexHull, HalfSpace, Mesh, Polygon, Pose, Sphere
+from collision_monitor import ConvexHull, HalfSpace, Mesh, Points, Polygon, Pose, Sphere
 from collision_monitor.codec import Removal, decode_contacts, decode_status, encode_descriptions, encode_states
 from collision_monitor.errors import Refusal
 from collision_monitor.monitor.state import roster
@@ -195,6 +195,19 @@ def test_an_impossible_model_leaves_the_box_and_says_why(run):
     assert "object 1: convex decomposition: expected a closed mesh" in run.texts[0] and STAYS in run.texts[0]
     run.pipeline.monitor.refuse(Refusal.SHAPE, "another one")
     assert run.last_refusal == "another one"
+
+
+def test_a_replay_refuses_an_object_that_has_no_box_for_the_same_reason():
+    """It has no model of its own either, but that is known only where there is the time to make one."""
+    rng = np.random.default_rng(0)
+    points = rng.uniform(-0.6e18, 0.6e18, (12_000, 3))
+    run = Run(Preparation(limit=0.0))
+    taken = run.describe(ObjectDescription(1, Points(points, 0.1), model=Model.CONVEX_DECOMPOSITION), BALL)
+    assert [each.object_id for each in taken.changes] == [2]
+    assert "1e+18" in run.last_refusal
+    again = Pipeline(HULLS, timed=False)
+    again.on_shapes(taken.data)
+    assert decode_status(again.status()).last_refusal == run.last_refusal
 
 
 @pytest.mark.parametrize("then", [Removal(1), ObjectDescription(1, Sphere(2.0))], ids=["removed", "described"])

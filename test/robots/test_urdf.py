@@ -38,6 +38,10 @@ TWO = """<robot name="two">
         ('<mimic joint="j" multiplier="two"/>', "", "multiplier: expected a finite number, got 'two'"),
         ('<mimic multiplier="2"/>', "", "<mimic>: expected an attribute joint, got multiplier"),
         ("", '<link name="a"/>', "line 7, <link name='a'>: expected a name of its own, got that of robot.urdf, line 2"),
+        ('<origin xyz="1_0 0 0"/>', "", "line 5, <origin>: xyz: expected 3 finite numbers, got '1_0 0 0'"),
+        ('<origin xyz="\u0663 0 0"/>', "", "xyz: expected 3 finite numbers"),
+        ("", f'<link name="{"x" * 257}"/>', "name: expected at most 256 characters, got 257"),
+        ("", f'<link {"x" * 1000}="1"/>', f"expected an attribute name, got {'x' * 200}"),
         ("", "<link/>", "line 7, <link>: expected an attribute name, got no attribute"),
         ("", '<link name="c"/>', "expected one link without a parent in the file, got a, c"),
         ("", '<joint name="k" type="fixed"><parent link="b"/></joint>', "expected <child link=…>, got none"),
@@ -104,6 +108,38 @@ def test_a_damaged_urdf_is_read_or_refused(data: st.DataObject) -> None:
             del text[at : at + data.draw(st.integers(1, 40))]
     with suppress(InputError):
         kinematic_tree(parse_urdf(bytes(text), "arm.urdf"))
+
+
+BOX = '<geometry><box size="1 1 1"/></geometry>'
+
+
+@pytest.mark.parametrize(
+    "left",
+    [
+        '<xacro:arm prefix="x"/>',
+        '<link name="c"><xacro:box_collision/></link>',
+        f'<link name="c"><collision><xacro:origin/>{BOX}</collision></link>',
+        '<link name="${prefix}c"/>',
+        '<link name="c"><collision><geometry><mesh filename="$(find arm)/c.stl"/></geometry></collision></link>',
+    ],
+)
+def test_what_is_left_of_a_xacro_file_is_no_urdf(left: str) -> None:
+    """A macro that nobody replaced may be a shape, which would not be monitored."""
+    with pytest.raises(InputError, match=r"line 7, <[a-z:]+.*>: expected a URDF, got a xacro file; convert it with"):
+        parse_urdf(TWO.format("", left), "robot.urdf")
+    ignored = '<gazebo><plugin filename="$(find x)"/></gazebo><link name="c"><visual name="${x}"/></link>'
+    assert "c" in parse_urdf(TWO.format("", ignored), "robot.urdf").links
+
+
+@pytest.mark.parametrize(
+    "inside", [f'<geometry><sphere radius="2"/>{BOX[10:]}', f'<geometry><sphere radius="2"/></geometry>{BOX}']
+)
+def test_no_shape_of_a_collision_is_left_out(inside: str) -> None:
+    """The format has one. Other readers take the first, or the last."""
+    text = TWO.format("", f'<link name="c"><collision><origin xyz="0 0 1"/>{inside}</collision></link>')
+    first, second = parse_urdf(text, "robot.urdf").links["c"].collisions
+    assert (first.geometry.tag, second.geometry.tag) == ("sphere", "box")
+    assert first.pose.position.tolist() == second.pose.position.tolist() == [0, 0, 1]
 
 
 def test_defaults_are_those_of_the_format() -> None:

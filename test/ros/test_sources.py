@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import rclpy
 import yaml
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from foreign_bag import SECOND, START, STORE, T, marker, markers, odometry, pose_stamped, transforms, write_bag
@@ -22,7 +23,10 @@ from foreign_messages import (
     track,
     tracked_objects,
 )
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from geometry_msgs.msg import PoseStamped
+from nav_msgs.msg import Odometry
+from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from std_msgs.msg import Header
 
 from collision_monitor.session import Session
 from collision_monitor.session.replaying.replay import replay
@@ -183,6 +187,40 @@ def test_a_line_that_cannot_be_used_is_named_and_the_rest_is_monitored(
     assert level_of(reports[-1], "wrong")[0] == DiagnosticStatus.ERROR
     assert level_of(reports[-1], "never") == (DiagnosticStatus.WARN, "/nothing has no publisher")
     assert team.statuses[-1].objects == 4
+    assert process.stop() == 0
+
+
+def test_publishers_that_come_later_are_heard_or_listed(
+    start: Callable[..., Any], team: Any, tmp_path: Path, ros_domain_id: int
+) -> None:
+    """The first one is reliable. DDS gives its subscription nothing of one that is not, nor of another type."""
+    (tmp_path / "sources.yaml").write_text("frame: map\nobjects: {robot: {topic: /odom, shape: {sphere: 1}}}\n")
+    reliable = team.node.create_publisher(Odometry, "/odom", 10)
+    reports: list[Any] = []
+    team.node.create_subscription(DiagnosticArray, "/object_monitor/sources", reports.append, 1)
+    process = start("run", "--sources", "sources.yaml")
+    team.until(lambda: "source /odom" in process.words, 60.0)
+
+    def moves(publisher: Any) -> bool:
+        message = Odometry(header=Header(frame_id="map", stamp=team.node.get_clock().now().to_msg()))
+        message.pose.pose.orientation.w = 1.0
+        steps = team.statuses[-1].step
+        publisher.publish(message)
+        team.listen(0.1)
+        return bool(team.statuses[-1].step > steps)
+
+    team.until(lambda: team.statuses and moves(reliable), 30.0)
+    context = rclpy.Context()  # one participant has one type of a topic
+    context.init(domain_id=ros_domain_id)
+    stranger = rclpy.create_node("stranger", context=context)
+    stranger.create_publisher(PoseStamped, "/odom", 10)
+    team.until(lambda: "/odom carries geometry_msgs/msg/PoseStamped too, which is not taken" in process.words, 20.0)
+    best_effort = team.node.create_publisher(Odometry, "/odom", qos_profile_sensor_data)
+    team.until(lambda: moves(best_effort), 20.0)
+    team.until(lambda: moves(reliable), 10.0)
+    stranger.destroy_node()
+    context.shutdown()
+    team.until(lambda: not any("another type" in each.name for each in reports[-1].status), 10.0)
     assert process.stop() == 0
 
 

@@ -14,11 +14,12 @@ import pytest
 import session_mutations as mutations
 import yaml
 import zstandard
-from foreign_bag import START, STORE, odometry, write_bag
+from foreign_bag import SECOND, START, STORE, odometry, write_bag
 from mcap.opcode import Opcode
 from mcap.writer import CompressionType, IndexType
 from mcap.writer import Writer as McapWriter
 from no_files import POINTER
+from processor_time import within
 from recorded_bags import ODOM, STEP, STILL, Row, mcap, read, rows
 from rosbags.rosbag2 import StoragePlugin
 
@@ -137,6 +138,18 @@ def test_a_chunk_that_is_there_twice_is_an_error(tmp_path: Path, index: IndexTyp
         read(path)
 
 
+@pytest.mark.parametrize("gap", [0, 5])
+@pytest.mark.parametrize("at", [0, 20])
+def test_a_message_outside_of_chunks_that_is_there_twice_is_an_error(tmp_path: Path, gap: int, at: int) -> None:
+    path = mcap(tmp_path / "bag.mcap", rows(), use_chunking=False, use_statistics=False)
+    assert read(path) == rows()
+    whole = mutations.parse(path.read_bytes(), len(MAGIC))
+    place = [k for k, each in enumerate(whole) if each.opcode == Opcode.MESSAGE][at]
+    path.write_bytes(with_summary([*whole[: place + gap + 1], whole[place], *whole[place + gap + 1 :]]))
+    with pytest.raises(SessionError, match=r"its message at byte \d+ is the one at byte \d+ once more"):
+        read(path)
+
+
 def test_statistics_of_a_channel_that_is_lost_with_its_messages(tmp_path: Path) -> None:
     """Two channels of one topic: of the second one, only the number of its messages is left."""
     path = tmp_path / "bag.mcap"
@@ -215,7 +228,7 @@ def reset(count: int, back: int, topic: str = ODOM) -> list[Row]:
 
 
 @pytest.mark.parametrize("options", [{"chunk_size": 2000}, {"chunk_size": 200_000}, {"use_chunking": False}])
-@pytest.mark.parametrize("back", [60, 100, 140])
+@pytest.mark.parametrize("back", [3, 10, 45, 60, 100, 140])
 def test_runs_keep_their_order_where_the_clock_of_receipt_was_set_back(
     tmp_path: Path, back: int, options: dict[str, Any]
 ) -> None:
@@ -226,8 +239,34 @@ def test_runs_keep_their_order_where_the_clock_of_receipt_was_set_back(
     assert read(path, "/other") == [row for row in given if row[0] == "/other"]
 
 
-def test_runs_in_a_table(tmp_path: Path) -> None:
-    given = reset(100, 80)
+@pytest.mark.parametrize("late", [1, 3, 40])
+def test_one_late_message_of_a_channel_is_sorted_by_its_time(tmp_path: Path, late: int) -> None:
+    """Only a second one that is late as well tells that the clock was set back."""
+    given = rows(200)
+    given.insert(100 + late, given.pop(100))
+    for options in ({"chunk_size": 2000}, {"use_chunking": False}):
+        assert read(mcap(tmp_path / "a.mcap", given, **options)) == rows(200)
+
+
+def test_a_file_in_no_order_is_read_soon(tmp_path: Path) -> None:
+    """The newest message first, each in a run of its own: a chunk is not unpacked for each of its messages."""
+    given = [(topic, time + (3000 - k) * 2 * SECOND, data) for k, (topic, time, data) in enumerate(rows(3000))]
+    path = mcap(tmp_path / "a.mcap", given, chunk_size=1 << 30)
+    with within(3.0):
+        assert read(path) == given[::-1]
+
+
+def test_a_clock_that_is_set_back_again_and_again_in_one_chunk(tmp_path: Path) -> None:
+    """As many runs as there may be, of a few messages each."""
+    given = [row for _ in range(1000) for row in rows(5)]
+    path = mcap(tmp_path / "a.mcap", given, chunk_size=1 << 30, compression=CompressionType.NONE)
+    with within(3.0):
+        assert read(path) == given
+
+
+@pytest.mark.parametrize("back", [3, 80])
+def test_runs_in_a_table(tmp_path: Path, back: int) -> None:
+    given = reset(100, back)
     messages = [(topic, time, ("nav_msgs/msg/Odometry", data)) for topic, time, data in given]
     assert read(write_bag(tmp_path / "bag", messages, storage=StoragePlugin.SQLITE3)) == given
 
@@ -364,6 +403,23 @@ def test_the_metadata_count_what_was_recorded(tmp_path: Path, storage: StoragePl
     with pytest.raises(
         SessionError, match=r"expected a file of the bag, as its metadata\.yaml says, got nothing there"
     ):
+        read(folder)
+
+
+@pytest.mark.parametrize(
+    "topics", [None, "x", ["x"], [None], [[]], [{}], [{"topic_metadata": "x"}], [{"topic_metadata": {"name": []}}]]
+)
+def test_metadata_of_other_types_state_nothing(tmp_path: Path, topics: Any) -> None:
+    folder = write_bag(tmp_path / "bag", messages())
+    change_yaml(folder, lambda table: table.update(topics_with_message_count=topics))
+    assert len(read(folder)) == 40
+
+
+@pytest.mark.parametrize("names", [[None], [""], [".."], ["."], ["a\0b"], ["x" * 5000], [{}], [["a"]], "ab", 7, ["/"]])
+def test_names_that_no_file_of_the_bag_has_are_refused(tmp_path: Path, names: Any) -> None:
+    folder = write_bag(tmp_path / "bag", messages())
+    change_yaml(folder, lambda table: table.update(relative_file_paths=names))
+    with pytest.raises(SessionError, match=r"expected (a file of the bag|the relative_file_paths of a bag)"):
         read(folder)
 
 

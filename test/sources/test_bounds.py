@@ -132,7 +132,7 @@ def test_long_names_are_not_kept(where: str) -> None:
     try:
         for k in range(1, 100):
             send(k)
-        assert tracemalloc.get_traced_memory()[0] < 3_500_000  # of 9.9 MB; the lists of 32 publishers of joints stay
+        assert tracemalloc.get_traced_memory()[0] < 1_000_000  # of 9.9 MB
     finally:
         tracemalloc.stop()
 
@@ -440,6 +440,41 @@ def test_an_object_that_could_not_be_used_is_listed_until_a_whole_scene_is_witho
         assert [row.what for row in played.feed.unmonitored if "bad" in row.what] == ["arm/bad"]
     played.send("/scene", SCENE, a_scene(an_object("good", BALL), is_diff=False))
     assert not any("bad" in row.what for row in played.feed.unmonitored)
+
+
+@pytest.mark.parametrize("where", ["touch links", "more touch links", "a link", "a matrix", "defaults", "paddings"])
+def test_long_names_in_a_planning_scene_are_not_kept(where: str) -> None:
+    played, _ = ready() if where != "a link" else (Played({"urdf_topic": "/u", "planning_scene": "/scene"}), None)
+
+    def send(k: int) -> None:
+        name = f"{k}" + "x" * 100_000
+        ball = an_object(f"o{k % 5}", BALL, frame="hand", operation=2 if where == "more touch links" else 0)
+        padding = message("moveit_msgs/msg/LinkPadding", link_name=name, padding=0.1)
+        fields: dict[str, dict[str, Any]] = {
+            "touch links": {"held": [attached("hand", ball, "hand", name)]},
+            "more touch links": {"held": [attached("hand", ball, name)]},
+            "a link": {"held": [attached(name, ball)]},
+            "a matrix": {"allowed_collision_matrix": matrix([name], [[True]])},
+            "defaults": {"allowed_collision_matrix": matrix([], [], **{name: True})},
+            "paddings": {"link_padding": [padding]},
+        }
+        played.send("/scene", SCENE, a_scene(**fields[where]))
+
+    send(0)
+    tracemalloc.start()
+    try:
+        for k in range(1, 40):
+            send(k)
+        assert tracemalloc.get_traced_memory()[0] < 1_000_000  # of 3.9 MB
+    finally:
+        tracemalloc.stop()
+
+
+def test_more_touch_links_than_a_robot_has_links_are_refused() -> None:
+    played, _ = ready()
+    touch = [f"link {k}" for k in range(2001)]
+    played.send("/scene", SCENE, a_scene(held=[attached("hand", an_object("cup", BALL, frame="hand"), *touch)]))
+    assert any("cup: touch_links: expected at most 2000 links, got 2001" in text for text in played.refusals)
 
 
 def test_a_frame_of_a_megabyte_is_not_kept_with_its_object() -> None:

@@ -48,3 +48,17 @@ def test_damaged_messages_raise_nothing(kind: str, stepping: dict[str, Any]) -> 
             (pipeline.on_states if given.topic is Topic.STATES else pipeline.on_shapes)(given.data)
     good = RawMessage("/it", name, data.tobytes(), START)
     assert isinstance(fed.feed.take(good), list)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_message_of_another_type_is_refused_by_the_name_of_the_type(kind: str) -> None:
+    entry, (name, message) = KINDS[kind]
+    fed = Fed({"it": {"topic": "/it", **entry}})
+    fed.give("/it", START, (name, message))
+    before = len(fed.steps), len(fed.changes)
+    others = {other: each for other, each in (content for _, content in KINDS.values()) if other != name}
+    for other, content in others.items():
+        fed.give("/it", START, (other, content))
+    assert (len(fed.steps), len(fed.changes)) == before
+    assert sorted(fed.refused) == sorted(f"/it: expected {name}, got {other}" for other in others)
+    assert not fed.feed.take_failures() and [row.what for row in fed.feed.unmonitored] == ["/it"]

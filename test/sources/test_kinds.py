@@ -207,8 +207,10 @@ def test_a_slow_monitor_gets_fewer_steps_and_each_has_the_newest_states(stepping
 def test_stamps_of_another_clock_are_refused_until_a_second_one_agrees() -> None:
     fed = Fed({"cart": {"topic": "/odom", "shape": SPHERE}}, rate=20)
 
+    received = iter(range(START, START + SECOND, STEP))
+
     def drive(stamp: int) -> None:
-        fed.give("/odom", stamp, odometry("map", stamp, (0, 0, 0), (0, 0, 0, 1), (1, 0, 0), (0, 0, 0)))
+        fed.give("/odom", next(received), odometry("map", stamp, (0, 0, 0), (0, 0, 0, 1), (1, 0, 0), (0, 0, 0)))
 
     drive(START)
     drive(START + 3600 * SECOND)

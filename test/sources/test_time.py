@@ -14,9 +14,12 @@ from foreign_messages import detection, detections, track, tracked_objects
 from hypothesis import given
 from hypothesis import strategies as st
 from played_sources import JOINTS, MILLISECOND, Played
+from recorded_bags import STILL
 
-from collision_monitor.errors import InputError
+from collision_monitor.codec import encode_states
+from collision_monitor.errors import InputError, Refusal
 from collision_monitor.monitor.state.timeline import Progress
+from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.sources.ground.source_time import MOST_STREAMS, Clock, SourceTime
 
 STEP = 50_000_000
@@ -190,6 +193,39 @@ def test_one_transform_message_out_of_order_does_not_set_time_back() -> None:
         fed.give("/tf", START + now * STEP, (each[0][0], content))
     stamps = [step.stamp_ns for step in fed.steps]
     assert stamps == sorted(stamps)
+
+
+# -- topics that are slow, or silent for long
+
+
+@pytest.mark.parametrize("stepping", STEPPING)
+@pytest.mark.parametrize("period", [8.0, 10.5, 15.0, 60.0, 3600.0])
+def test_a_slow_topic_that_is_the_only_one_is_monitored(period: float, stepping: dict[str, Any]) -> None:
+    """By the clock of receipt as much time passes: no stamp is one of another clock."""
+    fed = Fed({"robot": {"topic": "/odom", "shape": SPHERE}}, begin=START, **stepping)
+    pipeline = Pipeline("balanced", "map", timed=False)
+    pipeline.on_shapes(fed.feed.begin(START)[0].data)
+    for k in range(8):
+        stamp = START + round(k * period * SECOND)
+        fed.give("/odom", stamp + 3_000_000, odometry("map", stamp, (k, 0, 0), *STILL))
+    assert not fed.refused
+    assert fed.rows["position"][:, 0].tolist() == [float(k) for k in range(8)]
+    answers = [pipeline.on_states(encode_states(each.stamp_ns, "map", 0, each.states, None)) for each in fed.steps]
+    assert pipeline.monitor.refused[Refusal.TIME] == (7 if period > 1000 else 0)  # beyond, the monitor begins anew
+    assert pipeline.monitor.refused[Refusal.OLD] == 0
+    assert answers[-1].result.stamp_ns == fed.steps[-1].stamp_ns
+
+
+def test_a_slow_topic_does_not_confirm_a_clock_that_is_ahead() -> None:
+    """What is ahead by more than passed since the last message of any topic still needs a second one."""
+    fed = Fed({"robot": {"topic": "/odom", "shape": SPHERE}, "person": {"topic": "/person", "shape": SPHERE}})
+    for k in range(40):
+        now = START + k * SECOND
+        fed.give("/odom", now, odometry("map", now, (k, 0, 0), *STILL))
+        if k == 20:
+            fed.give("/person", now, pose_stamped("map", now + 15 * SECOND, (0, 0, 0)))
+    assert [text for text in fed.refused if "expected one within 10 s" in text]
+    assert (fed.rows["id"] == 1).sum() == 40
 
 
 # -- messages without a stamp

@@ -15,7 +15,8 @@ from collision_monitor.errors import CollisionMonitorError
 from collision_monitor.pipeline.topics import Topic
 from collision_monitor.ros.endpoints import message_class
 from collision_monitor.ros.health.line_report import LineReport
-from collision_monitor.ros.monitor.live_sources import LiveSources, quality_of_all
+from collision_monitor.ros.monitor.live_sources import LiveSources
+from collision_monitor.ros.monitor.topic_subscriptions import quality_of_all
 from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.sources import Decoder, Mapping
 from collision_monitor.sources.ground.frames import frame_name

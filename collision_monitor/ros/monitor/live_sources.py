@@ -14,7 +14,7 @@ from typing import Any, Final
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.logging import get_logging_directory
 from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy
 
 from collision_monitor.errors import CollisionMonitorError, InputError, MessageError
 from collision_monitor.pipeline.topics import Topic
@@ -22,6 +22,7 @@ from collision_monitor.ros.endpoints import message_class, publisher
 from collision_monitor.ros.health.line_report import DiagnosticLevel, LineReport
 from collision_monitor.ros.health.unmonitored_report import unmonitored_statuses
 from collision_monitor.ros.monitor.large_messages import LargeMessages
+from collision_monitor.ros.monitor.topic_subscriptions import TopicSubscriptions
 from collision_monitor.ros.names import is_topic_name
 from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.sources import Decoder, Feed, Input, Mapping, RawMessage, Unmonitored
@@ -45,8 +46,6 @@ REMINDER_PERIOD: Final = 10.0
 """s between two lines of the log about the same object, link or topic that is not monitored."""
 
 _TF: Final = ("/tf", "/tf_static")
-_DEPTH: Final = {"/tf": 100, "/tf_static": 100}
-"""Depth of the queue; 10 for the other topics."""
 
 
 class LiveSources:
@@ -65,6 +64,7 @@ class LiveSources:
         self._preparation = RobotPreparation()
         self._feed = Feed(mapping, self._decoder, allowance=AT_ONE_TIME, preparation=self._preparation)
         self._large = LargeMessages(self._decoder)
+        self._subscriptions = TopicSubscriptions(node, self._on_message)
         self._failures = FailureFiles(Path(get_logging_directory()))
         # Transforms first: if several messages wait, the executor takes them in the order of the subscriptions.
         self._asked = self._feed.wanted  # the file names these topics; those of tf may be there besides
@@ -125,7 +125,7 @@ class LiveSources:
 
     def _bind(self, topic: str, resolved: str, kind: str, infos: list[Any]) -> None:
         try:
-            message = message_class(kind)
+            message_class(kind)
             self._decoder.define(kind, definition(kind))
         except (ImportError, AttributeError, CollisionMonitorError):
             package = kind.partition("/")[0]
@@ -139,13 +139,20 @@ class LiveSources:
             self._feed.miss_topic(topic, f"no message on {topic} yet", self._now())
         for name, text in self._feed.bind(topic, kind).items():
             self._set_problem(name, text)
-        quality = quality_of_all(topic, infos)
+        quality = self._subscriptions.add(topic, resolved, kind, infos)
         if quality.durability is DurabilityPolicy.TRANSIENT_LOCAL:
             self._feed.silence.latched.add(topic)
-        self._node.create_subscription(
-            message, resolved, lambda data: self._on_message(topic, kind, data), quality, raw=True
-        )
         self._node.get_logger().info(f"source {topic}: {kind}")
+
+    def _look_again(self) -> None:
+        """Hear all publishers of the topics, and list those of other types."""
+        for topic, kinds in self._subscriptions.look_again():
+            what = f"{topic}, another type"
+            if kinds:
+                text = f"{topic} carries {', '.join(kinds)} too, which is not taken beside {self._found[topic]}"
+                self._feed.scene.unmonitored.lacks(self._line(topic), what, text, self._now())
+            else:
+                self._feed.scene.has(self._line(topic), what)
 
     def _line(self, topic: str) -> str:
         """Return the name of the first line of the file about a topic."""
@@ -234,6 +241,7 @@ class LiveSources:
 
     def _report(self) -> None:
         """Publish the state of each line of the file; log what is not monitored, each row at once and every 10 s."""
+        self._look_again()
         now, logged = time.monotonic(), {}
         for row in self.unmonitored:
             key = f"{row.line} {row.what}"
@@ -256,15 +264,3 @@ class LiveSources:
             )
         array.status += unmonitored_statuses(self._node.get_name(), self.unmonitored, self._now())
         self._out.publish(array)
-
-
-def quality_of_all(topic: str, infos: list[Any]) -> QoSProfile:
-    """Return the strictest quality of service that all publishers of a topic offer."""
-    offered = [info.qos_profile for info in infos]
-    reliable = all(each.reliability is ReliabilityPolicy.RELIABLE for each in offered)
-    latched = reliable and all(each.durability is DurabilityPolicy.TRANSIENT_LOCAL for each in offered)
-    return QoSProfile(
-        depth=_DEPTH.get(topic, 10),
-        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
-    )

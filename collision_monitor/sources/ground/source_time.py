@@ -13,7 +13,8 @@ from collision_monitor.errors import InputError
 from collision_monitor.monitor.state.timeline import Order, Progress, Timeline
 
 MAX_TIME_STEP: Final = 10.0
-"""s by which a stamp may jump; a larger jump needs a second message, as in the monitor."""
+"""s by which a stamp may jump; a larger jump needs a second message, as in the monitor. A stamp ahead may jump by what
+has passed since the last message besides, by the clock of receipt."""
 
 PATIENCE: Final = 0.5
 """s that a publisher with earlier stamps must go on before its time counts."""
@@ -63,7 +64,8 @@ class Clock:
 
     A stream of messages has rising stamps. A message before the last one of its stream is late, unless a second one
     agrees before the time advances. A message that is later than others of its stream were before, by no more than
-    they, is one of a slower publisher. Stamps that jump by more than MAX_TIME_STEP need a second message too.
+    they, is one of a slower publisher. Stamps that jump by more than MAX_TIME_STEP need a second message too, unless as
+    much time has passed by the clock of receipt.
     """
 
     def __init__(self, max_age: float) -> None:
@@ -72,6 +74,7 @@ class Clock:
         self._streams: dict[Hashable, _Stream] = {}
         self._back: int | None = None  # stamp of the last message for which time went back, since it last advanced
         self._next_look = 0  # ns: no earlier look for old streams while there is no room, because it takes 1 ms
+        self._received = 0  # receipt of the last message that was not refused, ns
 
     @property
     def has_begun(self) -> bool:
@@ -107,7 +110,9 @@ class Clock:
             self._back = stamp
         before, has_begun = self._timeline.now_ns, self.has_begun
         is_late = has_begun and before - stamp > self._max_age
-        progress = self._timeline.advance(stamp, Order.LATE if is_late else Order.IN_ORDER, MAX_TIME_STEP, PATIENCE)
+        order, silent = Order.LATE if is_late else Order.IN_ORDER, max(received - self._received, 0) * _NANOSECOND
+        limit = MAX_TIME_STEP + (silent if has_begun and stamp > before else 0.0)
+        progress = self._timeline.advance(stamp, order, limit, PATIENCE)
         if progress is Progress.RESTARTS:
             self._restart(stream, stamp, received)
         elif progress is Progress.CONTINUES:
@@ -117,6 +122,7 @@ class Clock:
         return progress
 
     def _note(self, stream: Hashable, known: _Stream | None, stamp: int, received: int) -> None:
+        self._received = received
         if known is None:
             if len(self._streams) >= MOST_STREAMS and self.now_ns >= self._next_look:
                 oldest = self.now_ns - round(MAX_TIME_STEP * _SECOND)
@@ -129,6 +135,7 @@ class Clock:
 
     def _restart(self, stream: Hashable, stamp: int, received: int) -> None:
         self.begin(stamp)
+        self._received = received
         self._streams[stream] = _Stream(stamp, received)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import InputError
+from collision_monitor.robots.urdf import LONGEST_LINK_NAME
 
 Answers = NDArray[np.int8]
 Places = tuple[NDArray[np.intp], NDArray[np.int8]]
@@ -39,10 +40,11 @@ class CollisionMatrix:
                 f"allowed collision matrix: expected {len(message.default_entry_names)} default values, "
                 f"got {len(message.default_entry_values)}"
             )
-        self._rows = {name: i for i, name in enumerate(names)}
+        self._rows = {name: i for i, name in enumerate(names) if len(name) <= LONGEST_LINK_NAME}
         allowed = np.array(rows, np.bool_).reshape(count, count)
         self._allowed = allowed | allowed.T
-        self._defaults = dict(zip(message.default_entry_names, map(bool, message.default_entry_values), strict=True))
+        defaults = zip(message.default_entry_names, map(bool, message.default_entry_values), strict=True)
+        self._defaults = {name: value for name, value in defaults if len(name) <= LONGEST_LINK_NAME}
 
     def forget(self, name: str) -> None:
         """Take a name out, as MoveIt does with an object that is removed: its next owner is another object."""

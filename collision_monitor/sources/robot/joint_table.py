@@ -23,6 +23,9 @@ MOST_NAMES: Final = 10_000
 _MOST_LAYOUTS: Final = 32
 """Different lists of names that are remembered. Each publisher of a robot has one."""
 
+_LONGEST_LAYOUT: Final = 100_000
+"""Characters of all names of a list that is remembered."""
+
 
 class JointTable:
     """Joints by the columns of a tree. fresh (J,): whether a joint has news that `at` has not returned yet.
@@ -92,12 +95,15 @@ class JointTable:
 
     def _layout(self, names: tuple[str, ...]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         """Return the places of our joints in the message, and their columns."""
-        if names not in self._layouts:
+        known = self._layouts.get(names)
+        if known is None:
+            found = {self._columns[name]: k for k, name in enumerate(names) if name in self._columns}
+            known = np.array([*found.values()], np.intp), np.array([*found], np.intp)
             if len(self._layouts) >= _MOST_LAYOUTS:
                 self._layouts.clear()
-            found = {self._columns[name]: k for k, name in enumerate(names) if name in self._columns}
-            self._layouts[names] = np.array([*found.values()], np.intp), np.array([*found], np.intp)
-        return self._layouts[names]
+            if sum(map(len, names)) <= _LONGEST_LAYOUT:
+                self._layouts[names] = known
+        return known
 
     def _difference(self, columns: NDArray[np.intp], given: Floats, stamp_ns: int) -> tuple[Floats, Mask]:
         """Return velocities from the last positions, and whether they are known."""

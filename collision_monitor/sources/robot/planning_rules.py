@@ -9,15 +9,13 @@ import numpy as np
 
 from collision_monitor.errors import InputError
 from collision_monitor.robots.srdf import Pair
+from collision_monitor.robots.urdf import LONGEST_LINK_NAME
 from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.robot.collision_matrix import ALLOWED, DENIED, CollisionMatrix
 from collision_monitor.sources.robot.link_rules import LinkRules
 
 MOST_LINKS = 10_000
 """Links with a padding or a scale of their own."""
-
-_LONGEST_NAME = 256
-"""Characters of a link's name that are kept."""
 
 MOST_ALLOWED = 100_000
 """Pairs of a link or attached object and another object whose contact is expected."""
@@ -54,7 +52,7 @@ class PlanningRules:
             (content.link_scale, "scale", self._scale),
         ):
             for row in rows:
-                value, link = float(getattr(row, field)), str(row.link_name)[:_LONGEST_NAME]
+                value, link = float(getattr(row, field)), str(row.link_name)[:LONGEST_LINK_NAME]
                 if not (0.0 <= value < 1e3 and (value > 0.0 or field == "padding")):
                     scene.refuse(self._name, f"{field} of {link:.80}: expected a positive number, got {value}")
                 elif link in known or len(known) < MOST_LINKS:

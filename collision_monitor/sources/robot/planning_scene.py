@@ -12,6 +12,7 @@ from typing import Any, Final
 
 from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.robots.urdf import LONGEST_LINK_NAME, MOST_LINKS
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.sources.ground.frames import MissingFrame
 from collision_monitor.sources.ground.mapping import Mapping as SourcesFile
@@ -199,9 +200,7 @@ class PlanningSceneSource(Source):
         scene.has(self.name, f"{self.name}/{name}")
         self._is_changed = True
 
-    def _change_held(
-        self, message: Any, name: str, stamp_ns: int, scene: SourceScene, *, leaves_world: bool
-    ) -> None:
+    def _change_held(self, message: Any, name: str, stamp_ns: int, scene: SourceScene, *, leaves_world: bool) -> None:
         """Attach or detach an object. leaves_world: whether the world keeps an object of that name, if it has one.
 
         Source: MoveIt, planning_scene.cpp, processAttachedCollisionObjectMsg. Raises InputError, ShapeError, PoseError.
@@ -219,12 +218,12 @@ class PlanningSceneSource(Source):
         known, held = self._world.get(name), self._held.get(name)
         if held is None and len(self._held) >= MOST_HELD:
             raise InputError(f"expected at most {MOST_HELD} attached objects, got more")
-        offset, touch = None, frozenset(map(str, message.touch_links))
+        offset, touch = None, _touched(message.touch_links)
         if not any(map(len, solids)) and known is not None:  # an object of the world is picked up
             content = known.content
         elif operation == APPEND and held is not None:
             content = collision_object(message.object, held.content)
-            touch |= held.touch
+            touch = _touched((*touch, *held.touch))
             if not has_pose(message.object.pose):
                 offset = held.offset
         else:
@@ -247,7 +246,9 @@ class PlanningSceneSource(Source):
     def _check_link(self, link: str) -> None:
         """Raise InputError if the robot is known and has no such link: what is there stays as it is."""
         robot = self._robot
-        if robot is not None and robot.robot is not None and link not in robot.robot.tree.links:
+        if robot is None or (robot.robot is None and len(link) <= LONGEST_LINK_NAME):
+            return
+        if robot.robot is None or link not in robot.robot.tree.links:
             raise InputError(_no_link(robot.name, link))
 
     def _let_go(self, name: str, stamp_ns: int, scene: SourceScene) -> None:
@@ -273,9 +274,7 @@ class PlanningSceneSource(Source):
             except CollisionMonitorError:
                 scene.remove(held.object_id)
                 raise
-            self._world[name] = WorldObject(
-                held.object_id, CollisionObject(name, held.content.shapes, scene.frame, at)
-            )
+            self._world[name] = WorldObject(held.object_id, CollisionObject(name, held.content.shapes, scene.frame, at))
             return
         self._lack(name, scene)
 
@@ -380,6 +379,14 @@ class PlanningSceneSource(Source):
 
 def _no_link(robot: str, link: str) -> str:
     return f"expected it at a link of {robot}, got {link!r:.80}"
+
+
+def _touched(names: Iterable[Any]) -> frozenset[str]:
+    """Return the names that links may have. Raises InputError for more than there may be links."""
+    found = frozenset(str(name) for name in names if len(name) <= LONGEST_LINK_NAME)
+    if len(found) > MOST_LINKS:
+        raise InputError(f"touch_links: expected at most {MOST_LINKS} links, got {len(found)}")
+    return found
 
 
 def _attached(content: Any) -> Any:

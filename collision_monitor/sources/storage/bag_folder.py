@@ -53,7 +53,9 @@ def _counts(topics: Any) -> dict[str, int]:
     found: dict[str, int] = {}
     for each in topics if isinstance(topics, list) else ():
         about = each.get("topic_metadata") if isinstance(each, dict) else None
-        name, count = (about or {}).get("name") if isinstance(about, dict) else None, each.get("message_count")
+        if not isinstance(about, dict):
+            continue
+        name, count = about.get("name"), each.get("message_count")
         if isinstance(name, str) and isinstance(count, int):
             found[name] = found.get(name, 0) + count
     return found

@@ -1,21 +1,25 @@
 """A bag in an MCAP file, read from its records and not by its indexes, which may lack messages or invent them.
 
 What was read is compared with the statistics of the file. A file without them may have indexes of its chunks, which say
-at least how many messages there were; and no chunk of it may be there twice.
+at least how many messages there were; and no chunk of it, or message outside of chunks, may be there twice.
 """
 
 from __future__ import annotations
 
+import hashlib
 import struct
+from array import array
 from collections import Counter
 from collections.abc import Collection, Iterator
 from io import BytesIO
 from pathlib import Path
 from typing import Final
 
+import numpy as np
 from mcap.data_stream import ReadDataStream
 from mcap.opcode import Opcode
 from mcap.records import Channel, Schema, Statistics
+from numpy.typing import NDArray
 
 from collision_monitor.errors import SessionError
 from collision_monitor.session.mcap.record_reader import McapReader, Message
@@ -144,24 +148,39 @@ class McapStorage:
         """Compare the indexes of chunks with the chunks: of each chunk, the index of its messages follows it."""
         if self._indexed > len(self._chunks):
             raise self._damaged(f"its summary states {self._indexed} chunks, there are {len(self._chunks)}")
-        if not self._chunks:
-            return
         stated = Counter({key: channel.count for key, channel in self._channels.items()})
         left: Counter[int] = Counter()  # messages of the last chunk that no index has named
         first: dict[bytes, int] = {}  # chunk with these first bytes
+        heads, places = array("q"), array("q")  # hashes of the first bytes of messages, and where they are
         for at, opcode, content in self._reader.glance():
             if opcode == Opcode.CHUNK:
                 left = self._chunks.get(at, Counter())
                 before = first.setdefault(content, at) if left else at
                 if before != at and self._are_equal(before, at):
                     raise self._damaged(f"its chunk at byte {at} is the one at byte {before} once more", hint="")
+            elif opcode == Opcode.MESSAGE:
+                heads.append(hash(content))
+                places.append(at)
             elif opcode == Opcode.MESSAGE_INDEX and len(content) >= _INDEX.size:
                 key, size = _INDEX.unpack_from(content)
                 left[key] -= size // _ENTRY
                 if left[key] < 0:
                     stated[key] -= left[key]
                     left[key] = 0
-        self._state(stated, "index")
+        self._check_single(np.array(heads, np.int64), np.array(places, np.int64))
+        if self._chunks:
+            self._state(stated, "index")
+
+    def _check_single(self, heads: NDArray[np.int64], places: NDArray[np.int64]) -> None:
+        """Compare the messages with equal hashes of their first bytes. Raises SessionError if two are equal."""
+        _, groups, counts = np.unique(heads, return_inverse=True, return_counts=True)
+        seen: dict[bytes, int] = {}
+        with self._reader.opened() as file:
+            for at in places[counts[groups] > 1].tolist():
+                (message,) = self._reader.record_at(file, at)
+                digest = hashlib.blake2b(repr(message).encode(), digest_size=16).digest()
+                if (before := seen.setdefault(digest, at)) != at:
+                    raise self._damaged(f"its message at byte {at} is the one at byte {before} once more", hint="")
 
     def _state(self, stated: Counter[int], where: str) -> None:
         """Note how many messages of each channel the file states. Raises SessionError for some of unknown channels."""

@@ -120,8 +120,8 @@ class SqliteStorage:
         ):
             if not isinstance(number, int):
                 return ["TRUE"]
-            if runs.begins(key, time):
-                starts.append(number)
+            if (start := runs.take(key, time, number)) is not None:
+                starts.append(start)
         if not runs.numbers().any():
             return ["TRUE"]
         ends = [f"id < {end}" for end in starts[1:]] + ["TRUE"]

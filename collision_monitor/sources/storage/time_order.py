@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Hashable, Iterable, Iterator
+from dataclasses import dataclass
 from heapq import heappop, heappush
 from itertools import islice
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,67 +23,125 @@ from collision_monitor.sources.storage.stored_channel import StoredMessage
 MOST_WAITING: Final = 1 << 30
 """Bytes of messages that wait for earlier ones in the chunks behind theirs. Recorders write about in order of time."""
 
-
 BACK: Final = 1_000_000_000
-"""ns by which the time of receipt of a channel falls when the clock was set back. Threads of a recorder differ less."""
+"""ns by which the time of receipt of a channel falls only when the clock was set back."""
+
+LATE: Final = 10_000_000
+"""ns by which a message is behind the one before it because threads of a recorder wrote both. If it is further behind,
+the next message of its channel tells whether it was late, or the clock was set back."""
 
 MOST_RUNS: Final = 1000
 """Runs of a file. With more, its messages are in no order, and that of time alone is the best."""
 
 
+@dataclass
+class _Fall:
+    """A message that is behind its channel, and what came since. place: of it. end: the latest time before it, ns."""
+
+    place: int
+    end: int
+    first: int
+    last: int
+    latest: dict[Hashable, int]  # by channel
+
+    def add(self, channel: Hashable, time: int) -> None:
+        """Take one more message."""
+        self.first, self.last = min(self.first, time), max(self.last, time)
+        self.latest[channel] = max(self.latest.get(channel, time), time)
+
+
 class Runs:
-    """The runs of a file: up to the message at which the clock of receipt was set back, and from it on."""
+    """The runs of a file: up to the message at which the clock of receipt was set back, and from it on.
+
+    The clock was set back where a channel falls by more than BACK; or by more than LATE, if its next message is behind
+    what it fell from as well, and no channel has gone on from there in the meantime.
+    """
 
     def __init__(self) -> None:
         self._first, self._last = array("q"), array("q")
         self._latest: dict[Hashable, int] = {}  # by channel
+        self._fall: _Fall | None = None
 
-    def __len__(self) -> int:
-        """Return the number of runs so far."""
-        return len(self._first)
-
-    def begins(self, channel: Hashable, time: int) -> bool:
-        """Take a message in the order of the file. Return whether a run begins with it."""
-        latest = self._latest.get(channel, time)
-        if self._first and time >= latest - BACK:
-            self._latest[channel] = max(latest, time)
+    def take(self, channel: Hashable, time: int, place: int) -> int | None:
+        """Take a message in the order of the file. Return the place at which a run began, once that is known."""
+        if len(self._first) > MOST_RUNS:
+            return None
+        if not self._first:
+            return self._begin(_Fall(place, time, time, time, {channel: time}))
+        before = self._latest.get(channel, time)
+        if time < before - BACK:
+            return self._begin(_Fall(place, time, time, time, {channel: time}))
+        if self._fall is not None and self._is_back(self._fall, channel, time, before):
+            self._fall.add(channel, time)
+            return self._begin(self._fall)
+        if self._fall is None and time < before - LATE:
+            self._fall = _Fall(place, self._last[-1], time, time, {channel: time})
+        elif self._fall is not None:
+            self._fall.add(channel, time)
+        else:
+            self._latest[channel] = max(before, time)
             self._first[-1], self._last[-1] = min(self._first[-1], time), max(self._last[-1], time)
-            return False
-        self._latest = {channel: time}
-        self._first.append(time)
-        self._last.append(time)
-        return True
+        return None
+
+    def _is_back(self, fall: _Fall, channel: Hashable, time: int, before: int) -> bool:
+        """Whether a message shows that the clock was set back. Forget the fall if it shows that a message was late."""
+        since = fall.latest.get(channel)
+        if since is not None and since < time < before:
+            return True
+        if time > fall.end or (since is not None and since < before <= time):
+            for key, each in fall.latest.items():
+                self._latest[key] = max(self._latest.get(key, each), each)
+            self._first[-1], self._last[-1] = min(self._first[-1], fall.first), max(self._last[-1], fall.last)
+            self._fall = None
+        return False
+
+    def _begin(self, fall: _Fall) -> int:
+        self._latest, self._fall = fall.latest, None
+        self._first.append(fall.first)
+        self._last.append(fall.last)
+        return fall.place
 
     def numbers(self) -> NDArray[np.int64]:
         """Return the number of each run; 0 for all, if order of time separates them as well, or if they are none."""
         first, last = np.array(self._first, np.int64), np.array(self._last, np.int64)
         order = np.argsort(first, kind="stable")
-        overlap = first[order][1:] < np.maximum.accumulate(last[order])[:-1] - BACK
-        return np.arange(len(self)) if overlap.any() and len(self) <= MOST_RUNS else np.zeros(len(self), np.int64)
+        overlap = first[order][1:] < np.maximum.accumulate(last[order])[:-1]
+        return np.arange(len(first)) if overlap.any() and len(first) <= MOST_RUNS else np.zeros(len(first), np.int64)
+
+
+class _Piece(NamedTuple):
+    """Messages of one run in one chunk. begin: offset of the chunk. Those from the place `start` to before `end`."""
+
+    run: int
+    time: int
+    begin: int
+    start: int
+    end: int
 
 
 class TimeOrder:
-    """The chunks of a file, by their offsets and the time of the first message in each (ns), cut where a run begins."""
+    """The chunks of a file: their offsets, the time of the first message in each (ns), and how many messages it has."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._runs = Runs()
-        self._begins, self._times, self._run = array("q"), array("q"), array("q")
-        self._from, self._to = array("q"), array("q")  # the places of the messages in a chunk
+        self._begins, self._times, self._ends = array("q"), array("q"), array("q")
+        self._count = 0
+        self._cuts = array("q")  # the number of the first message of each run
 
     def add(self, begin: int, messages: Iterable[tuple[int, int]]) -> None:
         """Note a chunk. messages: channel and time of each that can be read, in the order of the file."""
-        start = -1
-        for place, (channel, time) in enumerate(messages):
-            if self._runs.begins(channel, time) or start < 0:
-                start = place
-                self._begins.append(begin)
-                self._times.append(time)
-                self._run.append(len(self._runs) - 1)
-                self._from.append(place)
-                self._to.append(place)
-            self._times[-1] = min(self._times[-1], time)
-            self._to[-1] = place + 1
+        earliest = None
+        for channel, time in messages:
+            cut = self._runs.take(channel, time, self._count)
+            if cut is not None:
+                self._cuts.append(cut)
+            self._count += 1
+            earliest = time if earliest is None else min(earliest, time)
+        if earliest is not None:
+            self._begins.append(begin)
+            self._times.append(earliest)
+            self._ends.append(self._count)
 
     def merged(self, read: Callable[[int], Iterable[StoredMessage | None]]) -> Iterator[StoredMessage]:
         """Yield the messages in order of time, those of one time in that of the file, run by run.
@@ -92,16 +151,21 @@ class TimeOrder:
         """
         waiting: list[tuple[int, int, int, int, StoredMessage]] = []
         size = 0
-        times, runs = np.array(self._times, np.int64), self._runs.numbers()[np.array(self._run, np.int64)]
-        for row in np.lexsort((times, runs)).tolist():
-            begin, run = self._begins[row], int(runs[row])
-            while waiting and waiting[0][:2] < (run, self._times[row]):
+        source: Iterator[StoredMessage | None] = iter(())
+        at = -1, 0  # which chunk the source reads, and at which place
+        pieces = self._pieces()
+        for k in np.lexsort((pieces[:, 1], pieces[:, 0])):
+            piece = _Piece(*pieces[k].tolist())
+            while waiting and waiting[0][:2] < (piece.run, piece.time):
                 message = heappop(waiting)[-1]
                 size -= len(message.data)
                 yield message
-            for place, each in enumerate(islice(read(begin), self._from[row], self._to[row]), self._from[row]):
+            if at != (piece.begin, piece.start):
+                source = islice(read(piece.begin), piece.start, None)
+            at = piece.begin, piece.end
+            for place, each in enumerate(islice(source, piece.end - piece.start), piece.start):
                 if each is not None:
-                    heappush(waiting, (run, each.time, begin, place, each))
+                    heappush(waiting, (piece.run, each.time, piece.begin, place, each))
                     size += len(each.data)
             if size > MOST_WAITING:
                 raise SessionError(
@@ -110,3 +174,20 @@ class TimeOrder:
                 )
         while waiting:
             yield heappop(waiting)[-1]
+
+    def _pieces(self) -> NDArray[np.int64]:
+        """Return the pieces (P, 5) of the chunks, cut where runs begin, each with the first time of its whole chunk."""
+        found = array("q")
+        numbers = self._runs.numbers()
+        cuts = self._cuts if numbers.any() else self._cuts[:1]
+        run = start = 0
+        for begin, time, end in zip(self._begins, self._times, self._ends, strict=True):
+            first = start
+            while run < len(cuts) and cuts[run] < end:
+                if cuts[run] > start:
+                    found.extend((run - 1, time, begin, start - first, cuts[run] - first))
+                start = cuts[run]
+                run += 1
+            found.extend((run - 1, time, begin, start - first, end - first))
+            start = end
+        return np.array(found, np.int64).reshape(-1, len(_Piece._fields))
