@@ -14,7 +14,7 @@
     query.points.points_within     points_within                         which points of a cloud are near a shape
     query.points.kdop              kdop, Enclosure                       bounding slabs with directions of your own
     query.impact.time_of_impact    time_of_impact, Impact                 time of impact of two shapes, as an interval
-
+    query.conflicts.conflicts      conflicts, Conflict                    plans of many objects, and a static world
     query.impact.feature_impact    vertex_face_impact, edge_edge_impact   the same for features in linear motion
     response                       response.collide, reflect, …           what bodies do when they meet, for simulations
     records                        Model                                  the geometric models of an object
@@ -56,6 +56,8 @@ _HOME = {
     "times_of_impact": "query.impact.times_of_impact",
     "impacts": "query.impact.contact_intervals",
     "ContactInterval": "query.impact.contact_intervals",
+    "conflicts": "query.conflicts.conflicts",
+    "Conflict": "query.conflicts.conflicts",
     "contains": "query.points.containment",
     "cast_ray": "query.points.rays",
     "points_within": "query.points.points_within",
@@ -112,6 +114,8 @@ if TYPE_CHECKING:
     from collision_monitor.objects.convex_decomposition import Decomposition as Decomposition
     from collision_monitor.objects.convex_decomposition import convex_decomposition as convex_decomposition
     from collision_monitor.objects.description import ObjectDescription as ObjectDescription
+    from collision_monitor.query.conflicts.conflicts import Conflict as Conflict
+    from collision_monitor.query.conflicts.conflicts import conflicts as conflicts
     from collision_monitor.query.contact.contact import Contact as Contact
     from collision_monitor.query.contact.contact import contact as contact
     from collision_monitor.query.contact.contact_plot import plot as plot

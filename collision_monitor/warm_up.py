@@ -141,6 +141,7 @@ def warm_up_functions() -> None:
     warm_up_alerts()
     # imported here because a node, which warms up the monitor at its start, needs none of it
     from collision_monitor.detection.detector import WORTH_THREADS, Detector, default_threads
+    from collision_monitor.query.conflicts.conflicts import conflicts
     from collision_monitor.query.contact.contact import contact
     from collision_monitor.query.contact.contacts import contacts
     from collision_monitor.query.contact.overlap import overlap
@@ -165,6 +166,7 @@ def warm_up_functions() -> None:
     impacts(box, Motion(Pose()), ball, turns)
     turns.at(1.0)
     impacts(box, Trajectory([0, 1], [(0, 0, 0), (5, 0, 0)]), ball, turns)
+    conflicts([box, ball], [Trajectory([0, 1], [(0, 0, 0), (5, 0, 0)]), turns])
     poses = np.array([[0.0, 0, 0, 0, 0, 0, 1], [1.0, 0, 0, 0, 0, 0, 1]])
     contacts(box, poses, ball, poses)
     times_of_impact(box, poses, np.zeros((2, 6)), ball, poses, np.zeros((2, 6)))

@@ -18,7 +18,7 @@ from collision_monitor.errors import CollisionMonitorError
 
 COMMANDS: Final = (
     "demo", "run", "view", "sources", "rules", "world", "replay", "report", "compare",
-    "check", "salvage", "import", "tradeoff", "tune", "extremes", "bench",
+    "check", "conflicts", "salvage", "import", "tradeoff", "tune", "extremes", "bench",
 )  # fmt: skip
 """Commands in the order of `--help`. Each is a module of this package (`import_` for import) with an `add_parser`."""
 
@@ -41,6 +41,7 @@ examples:
   collision-monitor report run.mcap                        write an HTML page about a session
   collision-monitor compare before.mcap after.mcap         list the differences of two sessions
   collision-monitor check run.mcap --expect expected.yaml  use a session as a regression test
+  collision-monitor conflicts fleet.yaml                   list the conflicts of plans, ahead of time
   collision-monitor salvage cut.mcap -o whole.mcap         recover a damaged recording
   collision-monitor import bag --map map.yaml -o run.mcap  make a session from a bag
   collision-monitor tradeoff --scene fleet                 measure time and errors of each profile

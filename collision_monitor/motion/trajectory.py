@@ -12,7 +12,7 @@ from typing import Any, Final, Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import allocating_kernel
+from collision_monitor._jit import allocating_kernel, outlined
 from collision_monitor.checks.numbers import as_numbers, checked_number
 from collision_monitor.errors import PoseError
 from collision_monitor.motion.course import ARC, STRAIGHT, turned_for
@@ -360,20 +360,26 @@ def carried(numbers: Array, ages: Array) -> Array:
 def _carry(numbers: Any, ages: Any, out: Any) -> None:
     q = np.empty(4)
     for k in range(len(numbers)):
-        row, to, t = numbers[k], out[k], ages[k]
-        v, w, a = (row[7], row[8], row[9]), (row[10], row[11], row[12]), (row[13], row[14], row[15])
-        kind, rest = int(row[COURSE]), row[REST]
-        there = twist_on(kind, v, w, a, t, rest)
-        turn_quaternion(numbers[:, 3:7], k, w[0], w[1], w[2], turned_for(kind, v, a, t, rest), q)
-        for c in range(3):
-            to[c] = row[c] + there.moved[c]
-            to[LINEAR + c], to[ANGULAR + c] = there.velocity[c], there.angular[c]
-            to[ACCELERATION + c] = a[c] if kind == STRAIGHT else there.velocity[c] * there.change
-        for c in range(4):
-            to[3 + c] = q[c]
-        to[COURSE], to[REST] = row[COURSE], rest - t
-        if to[REST] <= 0.0:
-            to[COURSE], to[REST] = STRAIGHT, np.inf
+        carry(numbers, k, ages[k], out[k], q)
+
+
+@outlined
+def carry(numbers: Any, k: int, t: float, to: Any, q: Any) -> None:
+    """Write the motion numbers[k] (NUMBERS,) as it goes on from t (s) after its begin to `to`; q (4,): memory."""
+    row = numbers[k]
+    v, w, a = (row[7], row[8], row[9]), (row[10], row[11], row[12]), (row[13], row[14], row[15])
+    kind, rest = int(row[COURSE]), row[REST]
+    there = twist_on(kind, v, w, a, t, rest)
+    turn_quaternion(numbers[:, 3:7], k, w[0], w[1], w[2], turned_for(kind, v, a, t, rest), q)
+    for c in range(3):
+        to[c] = row[c] + there.moved[c]
+        to[LINEAR + c], to[ANGULAR + c] = there.velocity[c], there.angular[c]
+        to[ACCELERATION + c] = a[c] if kind == STRAIGHT else there.velocity[c] * there.change
+    for c in range(4):
+        to[3 + c] = q[c]
+    to[COURSE], to[REST] = row[COURSE], rest - t
+    if to[REST] <= 0.0:
+        to[COURSE], to[REST] = STRAIGHT, np.inf
 
 
 def as_motion(value: Any, name: str) -> Motion | Trajectory:
@@ -394,7 +400,7 @@ class PairPieces(NamedTuple):
 
 def pair_pieces(a: Motion | Trajectory, b: Motion | Trajectory, horizon: float) -> PairPieces:
     """The parts of the time from now to the horizon (s), or to where one of the motions is unknown from."""
-    end = min(horizon, _known_until(a), _known_until(b))
+    end = min(horizon, known_until(a), known_until(b))
     begins = [each.begins for each in (a, b) if isinstance(each, Trajectory)]
     within = [each[np.searchsorted(each, 0.0, side="right") : np.searchsorted(each, end)] for each in begins]
     starts = np.unique(np.concatenate([[0.0], *within]))
@@ -408,6 +414,6 @@ def pair_pieces(a: Motion | Trajectory, b: Motion | Trajectory, horizon: float) 
     return PairPieces(np.append(starts, max(end, 0.0)), rows[0], rows[1], tubes)
 
 
-def _known_until(motion: Motion | Trajectory) -> float:
+def known_until(motion: Motion | Trajectory) -> float:
     """Time (s) from which on a motion is unknown; infinite: never."""
     return float(motion.times[-1]) if isinstance(motion, Trajectory) and motion.then == "unknown" else inf

@@ -39,13 +39,18 @@ def _follow(monitor: Monitor, given: ObjectTrajectory, stamp_ns: int) -> None:
     if not len(given.times):
         monitor.follow(given.object_id, None)
         return
+    plan = trajectory_of(given)
+    tolerance = Tolerance(*given.tolerance.tolist()) if given.tolerance.any() else Tolerance()
+    monitor.follow(given.object_id, plan, stamp_ns=stamp_ns, tolerance=tolerance)
+
+
+def trajectory_of(given: ObjectTrajectory) -> Trajectory:
+    """The trajectory in a message. Raises InputError, PoseError."""
     if given.between not in _BETWEEN or given.then not in _THEN:
         raise InputError(
             f"between and then: expected {list(_BETWEEN)} and {list(_THEN)}, got {given.between} and {given.then}"
         )
     twists = given.twists if len(given.twists) else None
-    plan = Trajectory(
+    return Trajectory(
         given.times, given.poses, twists, between=_BETWEEN[given.between], then=_THEN[given.then]
     )  # fmt: skip
-    tolerance = Tolerance(*given.tolerance.tolist()) if given.tolerance.any() else Tolerance()
-    monitor.follow(given.object_id, plan, stamp_ns=stamp_ns, tolerance=tolerance)

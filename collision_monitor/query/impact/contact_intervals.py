@@ -3,31 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import inf, sqrt
-from typing import Any, Final
+from math import inf
+from typing import Any
 
 import numpy as np
 
-from collision_monitor._jit import kernel
 from collision_monitor.checks.numbers import checked_whole
 from collision_monitor.geometry.point_in_polygon import Location
-from collision_monitor.impact.mesh_pair import SURFACES
-from collision_monitor.meshes.advance.approach import time_until
-from collision_monitor.motion.motion import MOTION, half_acceleration, most_turning, relative_velocity
 from collision_monitor.motion.stated_motion import LINEAR, Motion
 from collision_monitor.motion.trajectory import Trajectory, carried
 from collision_monitor.query.body import QueryBody
-from collision_monitor.query.contact.contact_kernel import contact_row
+from collision_monitor.query.contact.contact_kernel import MEMORY
 from collision_monitor.query.contact.open_gap import location_of
-from collision_monitor.query.impact.impact_kernel import set_motion
+from collision_monitor.query.impact.exit_kernel import ExitSearch, exit_memory, exit_of_chains
 from collision_monitor.query.impact.impact_query import ITERATIONS, MotionQuery, check_query
 from collision_monitor.query.impact.planned_impact import PlannedPair, next_planned_impact, planned_pair
+from collision_monitor.query.library import LIBRARY
 from collision_monitor.shapes.compound import Compound
 from collision_monitor.shapes.pose import Pose
-
-STEPS: Final = 400
-"""Most contacts that are computed on the way to an exit. Each step takes the share of the overlap that the body would
-leave if all its points moved the same way; more steps follow slower exits."""
 
 
 @dataclass(frozen=True)
@@ -74,8 +67,20 @@ def impacts(
     query, most = check_query(horizon, tolerance, separation, iterations), checked_whole(most, "most")
     pair = planned_pair((shape_a, motion_a), (shape_b, motion_b), query.horizon)
     until = float(pair.pieces.borders[-1])
+    found = intervals_from(pair, query, 0.0, most)
+    if until < query.horizon and len(found) < most and not (found and found[-1].exit[1] == inf):
+        found.append(ContactInterval((until, inf), (until, inf)))
+    return found
+
+
+def intervals_from(pair: PlannedPair, query: MotionQuery, begin: float, most: int) -> list[ContactInterval]:
+    """Up to `most` intervals of contact from `begin` (s) on, until the motions end to be known.
+
+    One that is unresolved is the last. The bodies are apart at `begin`, unless it is 0.
+    """
+    until = float(pair.pieces.borders[-1])
     found: list[ContactInterval] = []
-    entry = next_planned_impact(pair, query, 0.0)
+    entry = next_planned_impact(pair, query, begin)
     while entry[0] < inf and len(found) < most:
         if entry[1] == inf:
             found.append(ContactInterval(entry, (entry[0], inf)))
@@ -85,8 +90,6 @@ def impacts(
         if not out[1] < until:
             break
         entry = next_planned_impact(pair, query, out[1])
-    if until < query.horizon and len(found) < most and not (found and found[-1].exit[1] == inf):
-        found.append(ContactInterval((until, inf), (until, inf)))
     return found
 
 
@@ -113,51 +116,24 @@ def _exit_within(
     where no contact is certain in the piece.
     """
     a, b = pair
-    lasts = -inf
-    t, horizon = begin, query.horizon
-    # a half-space, of infinite radius, does not turn
-    arms = np.array([each.radius if each.radius < inf else 0.0 for each in (a, b)])
-    memory, stay = np.zeros(2, MOTION), np.empty(2)
-    slots, later = (a.slots.first, b.slots.first), 0.0
-    for _ in range(STEPS):
-        now = [Pose.of_numbers(row[:LINEAR].tolist()) for row in carried(numbers, np.full(2, t + later))]
-        gap, bound, _ = contact_row(slots[0], now[0], slots[1], now[1], SURFACES)
-        gap, bound = gap - query.separation, bound + tube
-        if gap - bound > 2.0 * query.tolerance and not _is_inside(a, b, now):
-            return lasts, t + later
-        _stay(memory, numbers, t + later, horizon, arms, -(gap + bound), stay)
-        speed, step = stay.tolist()
-        if gap + bound < -0.5 * query.tolerance and step > 0.0:
-            lasts, later = min(t + later + step, horizon), 0.0
-            t = lasts
-            if not t < horizon:
-                break
-            continue
-        # as good as apart: look ahead by the time in which they move by the tolerance, then by more and more
-        shortest = query.tolerance / speed if speed > 0.0 else horizon
-        later = max(2.0 * later, 4.0 * shortest)
-        if not t + later < horizon:
-            break
-    return lasts, inf
+    arms = arm_of(a), arm_of(b)
+    search = ExitSearch(numbers, arms, tube, query.horizon, query.separation, query.tolerance)
+    state, memory = np.array([begin, 0.0, -inf, 0.0]), exit_memory()
+    chains = np.int32(a.slots.first), np.int32(b.slots.first)
+    while exit_of_chains(*LIBRARY.tuples, MEMORY.scratch, chains, search, state, memory):
+        apart = float(state[0] + state[1])
+        if not ((a.has_mesh or b.has_mesh) and _is_inside(a, b, numbers, apart)):
+            return float(state[2]), apart
+        state[3] = 1.0
+    return float(state[2]), inf
 
 
-def _is_inside(a: QueryBody, b: QueryBody, now: list[Pose]) -> bool:
+def arm_of(body: QueryBody) -> float:
+    """Radius (m) about the origin of an object that may turn; 0 for a half-space, which does not."""
+    return body.radius if body.radius < inf else 0.0
+
+
+def _is_inside(a: QueryBody, b: QueryBody, numbers: Any, t: float) -> bool:
     """Whether one body may be inside the other, whose surface it does not touch: solid meshes alone hide that."""
-    if not (a.has_mesh or b.has_mesh):
-        return False
+    now = [Pose.of_numbers(row[:LINEAR].tolist()) for row in carried(numbers, np.full(2, t))]
     return any(place != Location.OUTSIDE for place in location_of(a, now[0], b, now[1]))
-
-
-@kernel
-def _stay(motion: Any, numbers: Any, t: float, until: float, arms: Any, depth: float, stay: Any) -> None:
-    """Write how fast points of two motions may part from t on (m/s), and how long (s) a depth (m) lasts, to stay (2,).
-
-    numbers (2, NUMBERS): of both motions; motion (2,) MOTION: memory. arms (2,): radii (m) about their origins.
-    """
-    A, B = motion[0], motion[1]
-    set_motion(A, numbers, 0)
-    set_motion(B, numbers, 1)
-    v = relative_velocity(A, B, t)
-    turning = most_turning(A, t, until) * arms[0] + most_turning(B, t, until) * arms[1]
-    stay[0] = sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) + turning
-    stay[1] = time_until(depth, stay[0], 2.0 * half_acceleration(A, B, t, until))

@@ -80,7 +80,7 @@ def _round_off(A: Any, B: Any) -> float:
 
 
 @outlined
-def _first_impact(table: Any, parts: Any, chains: Any, window: Any, search: Any, scratch: Any, moving: Any) -> Any:
+def first_impact_in(table: Any, parts: Any, chains: Any, window: Any, search: Any, scratch: Any, moving: Any) -> Any:
     """First impact of two chains (first slots) in a window: lower, upper (s), infinite for none, and a code."""
     motion, event, row = moving
     A, B = motion[0], motion[1]
@@ -142,7 +142,7 @@ def impact_of_chains(
     set_rotation(scratch, ai, aj, ak, aw, A.rotation)
     set_rotation(scratch, bi, bj, bk, bw, B.rotation)
     search, chains = ImpactQuery(separation, tolerance, iterations), (np.int32(a), np.int32(b))
-    return _first_impact(table, parts, chains, Window(begin, horizon), search, scratch, (motion, event, row))
+    return first_impact_in(table, parts, chains, Window(begin, horizon), search, scratch, (motion, event, row))
 
 
 @inlined
@@ -170,7 +170,7 @@ def impacts_of_chains(
         if chains[0] >= 0 and chains[1] >= 0:
             set_motion(moving[0][0], motions_a, min(k, len(motions_a) - 1))
             set_motion(moving[0][1], motions_b, min(k, len(motions_b) - 1))
-            rows[k, 0], rows[k, 1], rows[k, 2] = _first_impact(table, parts, chains, window, search, scratch, moving)
+            rows[k, 0], rows[k, 1], rows[k, 2] = first_impact_in(table, parts, chains, window, search, scratch, moving)
 
 
 @kernel
@@ -188,7 +188,7 @@ def impact_of_pieces(
         set_motion(motion[0], numbers_a, k)
         set_motion(motion[1], numbers_b, k)
         motion[0].tube_0, motion[1].tube_0 = tubes[k, 0], tubes[k, 1]
-        found = _first_impact(table, parts, chains, Window(0.0, borders[k + 1] - borders[k]), search, scratch, moving)
+        found = first_impact_in(table, parts, chains, Window(0.0, borders[k + 1] - borders[k]), search, scratch, moving)
         if found[0] < inf:
             break
         k += 1

@@ -69,7 +69,7 @@ class Mapping:
 
     def located(self, message: str) -> str:
         """Return an error text with the file and the line of the key with which it begins."""
-        return _located(message, self.path, self.lines)
+        return located(message, self.path, self.lines)
 
 
 def load_mapping(path: Path) -> Mapping:
@@ -79,7 +79,7 @@ def load_mapping(path: Path) -> Mapping:
     try:
         return make_mapping(content, str(path), lines)
     except CollisionMonitorError as error:
-        raise InputError(_located(str(error), str(path), lines)) from None
+        raise InputError(located(str(error), str(path), lines)) from None
 
 
 def make_mapping(content: Any, path: str = "", lines: dict[str, int] | None = None) -> Mapping:
@@ -112,7 +112,8 @@ def make_mapping(content: Any, path: str = "", lines: dict[str, int] | None = No
     )
 
 
-def _located(message: str, path: str, lines: dict[str, int]) -> str:
+def located(message: str, path: str, lines: dict[str, int]) -> str:
+    """Return an error text with the file and the line of the key with which it begins."""
     begins = [key for key in lines if message.startswith((f"{key}:", f"{key},"))]
     where = f"{path}, line {lines[max(begins, key=len)]}" if begins else path
     return f"{where}: {message}" if where else message

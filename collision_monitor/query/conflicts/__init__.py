@@ -1,0 +1,1 @@
+"""Whole plans of many objects against each other, ahead of time."""
