@@ -13,9 +13,9 @@ import numpy as np
 import collision_monitor as cm
 from collision_monitor.alerts.closest_approach import closest_approaches
 from collision_monitor.alerts.monitored_bodies import MonitoredBodies
-from collision_monitor.monitor.nearest_points import nearest_points_at
 from collision_monitor.alerts.rules import Rules
 from collision_monitor.codec import encode_descriptions, encode_states
+from collision_monitor.monitor.nearest_points import nearest_points_at
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.records import STATE

@@ -100,7 +100,8 @@ class Announcement(event.Listener):
 
 def _is_plain_terminal() -> bool:
     """Whether stderr is a terminal in which no other bar is drawn."""
-    return sys.stderr is not None and sys.stderr is sys.__stderr__ and sys.stderr.isatty()
+    stream = sys.__stderr__
+    return stream is not None and stream is sys.stderr and stream.isatty()
 
 
 @contextmanager

@@ -218,7 +218,7 @@ class Intake(Stage):
 def checked_nanoseconds(value: Any, name: str) -> int:
     """Return a time as int. Raises InputError."""
     if not isinstance(value, int | np.integer) or isinstance(value, bool):
-        got = f"got {value!r:.100}; of seconds t write stamp=t in a step, and round(1e9 * t) elsewhere"
+        got = f"got {value!r:.100}; of seconds t write round(1e9 * t){', or stamp=t' if name == 'stamp_ns' else ''}"
         raise InputError(f"{name}: expected an integer number of nanoseconds, {got}")
     if not -MOST_NANOSECONDS <= value < MOST_NANOSECONDS:
         raise InputError(f"{name}: expected nanoseconds that 64 bits can hold, got {value}")

@@ -125,11 +125,11 @@ class Monitor(Stages):
         if isinstance(object_id, str):
             name = name or object_id
             object_id = self.id_of(object_id) if replace else max(self.ids, default=0) + 1
-        others = tuple(map(self.id_of, allowed)) if not isinstance(allowed, str) else (self.id_of(allowed),)
+        is_list = isinstance(allowed, Iterable) and not isinstance(allowed, str)
         description = ObjectDescription(
             *(object_id, shape, name, static, pose, group, mask, padding),
             model=cast(Model, model),  # or its name
-            allowed=others,
+            allowed=tuple(map(self.id_of, allowed)) if is_list else cast(Any, allowed),
             max_linear_acceleration=max_linear_acceleration,
             max_angular_acceleration=max_angular_acceleration,
         )
@@ -268,7 +268,8 @@ class Monitor(Stages):
         if stamp is not None:
             stamp_ns = round(1e9 * checked_number(stamp, "stamp", "s", least=-MOST_SECONDS, most=MOST_SECONDS))
         with self.clock:
-            result = self.take_step(Observation(stamp_ns, self._numbered(ids), poses, twists, covariance, now_ns))
+            given = Observation(cast(int, stamp_ns), self._numbered(ids), poses, twists, covariance, now_ns)
+            result = self.take_step(given)
         self._refusals.warn(result.refused)
         return result
 
