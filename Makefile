@@ -14,7 +14,7 @@ unexport PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
 # Without bytecode beside the sources every process would compile what it imports: half a second for a node.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup setup-demo interfaces demo test test-core test-fast coverage lint format docs fuzz fuzz-files soak bench bench-peers clean
+.PHONY: help setup setup-demo interfaces demo test test-core test-ros test-fast coverage lint format docs fuzz fuzz-files soak bench bench-peers release-tree clean
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -32,12 +32,15 @@ demo: setup-demo ## play a scene and show the monitor's answers, live in this te
 interfaces: setup ## build the message packages that the wheels lack: tf2, vision, autoware, moveit
 	@$(BIN)/python scripts/set_up/interfaces.py
 
+# The tests of the node mostly wait, and the others compute: side by side, those that compute leave the cores to the rest.
 test: interfaces ## set up, lint and run every test
-	@$(MAKE) --no-print-directory -j2 lint test-core
-	@$(BIN)/python -m pytest -n 3 --dist worksteal test/ros test/setup
+	@$(MAKE) --no-print-directory -j3 NICE="nice -n 10" test-ros lint test-core
 
 test-core: setup ## run the tests, except those of the node and of the set-up
-	@$(BIN)/python -m pytest -n auto --dist worksteal --ignore=test/ros --ignore=test/setup
+	@$(NICE) $(BIN)/python -m pytest -n auto --dist worksteal --ignore=test/ros --ignore=test/setup
+
+test-ros: interfaces ## run the tests of the node and of the set-up
+	@env -u MAKEFLAGS $(BIN)/python -m pytest -n 3 --dist worksteal test/ros test/setup  # they call make themselves
 
 # What a change most likely breaks, in less than a minute: the order of the source, and what every answer goes through.
 FAST := test/test_house.py test/test_layers.py test/test_public_api.py test/test_lazy_names.py test/checks test/settings \
@@ -54,7 +57,7 @@ coverage: setup ## run test-core, and write which lines of Python it runs into b
 
 lint: setup ## run ruff, mypy --strict and codespell
 	@$(BIN)/ruff check .
-	@$(BIN)/mypy
+	@$(NICE) $(BIN)/mypy
 	@$(BIN)/codespell
 
 CHANGED = { git diff --name-only --diff-filter=d HEAD; git ls-files --others --exclude-standard; } | grep '\.py$$'
@@ -90,6 +93,9 @@ bench: setup ## time single calls, a start, full detection and every installed p
 
 bench-peers: ## install the systems that bench compares with
 	@sh benchmarks/install_peers.sh
+
+release-tree: setup-demo ## lay both ROS packages side by side in build/release, as bloom and colcon want them
+	@$(BIN)/python scripts/release_tree.py $(ARGS)
 
 clean: ## remove all files that the set-up or a build made
 	rm -rf .venv .venv-peers build install log .coverage .mypy_cache .ruff_cache .pytest_cache .hypothesis *.egg-info

@@ -13,9 +13,9 @@ import numpy as np
 import collision_monitor as cm
 from collision_monitor.alerts.closest_approach import closest_approaches
 from collision_monitor.alerts.monitored_bodies import MonitoredBodies
-from collision_monitor.alerts.nearest_points import nearest_points_at
 from collision_monitor.alerts.rules import Rules
 from collision_monitor.codec import encode_descriptions, encode_states
+from collision_monitor.monitor.nearest_points import nearest_points_at
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
 from collision_monitor.records import STATE
@@ -87,7 +87,9 @@ def errors(pairs: int = 2000) -> None:
     worst = []
     for k in range(pairs):
         many = np.full(len(times), i[k]), np.full(len(times), j[k])
-        found = nearest_points_at(scene, *many, scene.now + times, np.full(len(times), np.inf), widen=False)
+        found = nearest_points_at(
+            scene.roster.multibody, *many, scene.now + times, np.full(len(times), np.inf), 0.0, scene.scratch
+        )
         relative = np.sqrt(((scene.velocity[j[k]] - scene.velocity[i[k]]) ** 2).sum())
         path = 2.0 * (relative + scene.turning[i[k]] + scene.turning[j[k]])
         worst.append((found.distance.min() - least[k]) / path if found.distance.min() > 0.0 else 0.0)

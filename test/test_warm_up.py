@@ -182,16 +182,19 @@ VOLUME = """
 import json
 from collision_monitor import warm_up
 from collision_monitor._jit.kernel_cache import KernelCache
+from collision_monitor._jit.places import kernel_places
 files, find = set(), KernelCache._file
 
 def watch(self, signature, target):
-    files.add(find(self, signature, target))
+    files.add((self._folder, find(self, signature, target)))
     return find(self, signature, target)
 
 KernelCache._file = watch
 for part in warm_up.PARTS.values():
     part()
-print(json.dumps([len(files), sum(each.stat().st_size for each in files)]))
+places = list(kernel_places())
+paths = [next(path for place in places if (path := place / folder / name).exists()) for folder, name in files]
+print(json.dumps([len(files), sum(each.stat().st_size for each in paths)]))
 """
 
 

@@ -9,11 +9,13 @@ from __future__ import annotations
 
 import functools
 import hashlib
-import os
 import sys
-from pathlib import Path
+from typing import Final
 
 from collision_monitor._jit.imports import source_file, with_dependencies
+
+NEUTRAL: Final = tuple(f"collision_monitor._jit.{name}" for name in ("cache", "compilation", "imports", "places"))
+"""Modules that every kernel depends on and that change nothing in it: where it is kept, and what is said meanwhile."""
 
 
 @functools.cache
@@ -24,21 +26,12 @@ def _file_digest(module: str) -> bytes:
 
 @functools.cache
 def folder(module: str) -> str:
-    """Return the cache folder of the kernels of `module`, a dotted name."""
+    """Return the name of the cache folder of the kernels of `module`, a dotted name, in each place (`places.py`)."""
     import numba
 
     digest = hashlib.blake2b(f"{numba.__version__} {sys.version_info[:2]}".encode(), digest_size=8)
     for name in with_dependencies(module):
+        if name in NEUTRAL:
+            continue
         digest.update(name.encode() + _file_digest(name))
-    return str(_root() / digest.hexdigest())
-
-
-def _root() -> Path:
-    """Return NUMBA_CACHE_DIR, or a folder in the virtual environment if it is writable, or one in the user's cache."""
-    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
-        return Path(chosen)
-    prefix = Path(sys.prefix)
-    if sys.prefix != sys.base_prefix and os.access(prefix, os.W_OK):
-        return prefix / "var" / "cache" / "collision_monitor"
-    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return Path(base) / "collision_monitor"
+    return digest.hexdigest()

@@ -9,11 +9,8 @@ from __future__ import annotations
 import contextlib
 import functools
 import hashlib
-import os
 import pickle
-import tempfile
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any, Final
 
 import llvmlite.binding as llvm
@@ -24,6 +21,7 @@ from numba.core.serialize import dumps
 
 from collision_monitor._jit.cache import folder
 from collision_monitor._jit.libraries import Callee, DeviceLibrary, LoadedKernel, OutlinedLibrary, callees
+from collision_monitor._jit.places import is_trusted, kernel_places, read_kernel, write_kernel
 
 _UNREADABLE: Final = (OSError, EOFError, ValueError, pickle.UnpicklingError, ImportError, AttributeError)
 """What reading a file of the cache raises; the last two if a class of its arguments has moved or is gone."""
@@ -34,30 +32,34 @@ class KernelCache(NullCache):  # type: ignore[misc]
 
     def __init__(self, function: Callable[..., Any], kind: str) -> None:
         self._function, self._kind = function, kind
-        self._folder = Path(folder(function.__module__))
+        self._folder = folder(function.__module__)
         self._name = f"{function.__qualname__.replace('<locals>.', '')}-{function.__code__.co_firstlineno}"
 
     @property
     def cache_path(self) -> str:
-        """The folder of the module's kernels."""
-        return str(self._folder)
+        """The folder of the module's kernels, as numba's own caches say it."""
+        return str(next(iter(kernel_places())) / self._folder)
 
-    def _file(self, signature: Any, target: Any) -> Path:
+    def _file(self, signature: Any, target: Any) -> str:
         types = getattr(signature, "args", signature)
         key = repr((tuple(types), target.codegen().magic_tuple()))
         digest = hashlib.blake2b(key.encode(), digest_size=8).hexdigest()
-        return self._folder / f"{self._name}-{digest}.{self._kind}"
+        return f"{self._name}-{digest}.{self._kind}"
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """Return the compiled function, or None if it has to be compiled."""
-        with contextlib.suppress(*_UNREADABLE):
-            data = self._file(sig, target_context).read_bytes()
-            digest, data = data[:16], data[16:]
-            if hashlib.blake2b(data, digest_size=16).digest() == digest:  # not cut off by a full disk
-                compiled = _rebuild(target_context, pickle.loads(data))
-                if compiled is not None:
-                    self._identify(sig, compiled)
-                    return compiled
+        file = self._file(sig, target_context)
+        for place in kernel_places():
+            if not is_trusted(place, self._folder):
+                continue
+            with contextlib.suppress(*_UNREADABLE):
+                data = read_kernel(place / self._folder / file)
+                digest, data = data[:16], data[16:]
+                if hashlib.blake2b(data, digest_size=16).digest() == digest:  # not cut off by a full disk
+                    compiled = _rebuild(target_context, pickle.loads(data))
+                    if compiled is not None:
+                        self._identify(sig, compiled)
+                        return compiled
         target_context.refresh()
         return None
 
@@ -68,7 +70,7 @@ class KernelCache(NullCache):  # type: ignore[misc]
             compiled.library.itself = Callee(self._function.__module__, name, types, compiled.fndesc.mangled_name)
 
     def save_overload(self, sig: Any, data: Any) -> None:
-        """Save a compiled function; a disk without space costs only the next compilation."""
+        """Save a compiled function; without a place that can be written to, it lasts as long as this process."""
         self._identify(sig, data)
         data.library.callees = callees(data.library)
         if data.library.has_dynamic_globals or data.lifted:
@@ -77,15 +79,11 @@ class KernelCache(NullCache):  # type: ignore[misc]
         data.fndesc.typemap = data.fndesc.calltypes = None  # the types of all variables
         parts = (_code(data.library), data.fndesc, data.environment, data.signature, data.reload_init)
         content = dumps((data.library.callees, *parts))
-        with contextlib.suppress(OSError):
-            file.parent.mkdir(parents=True, exist_ok=True)
-            handle, temporary = tempfile.mkstemp(dir=file.parent, prefix=file.name)
-            try:
-                with os.fdopen(handle, "wb") as stream:
-                    stream.write(hashlib.blake2b(content, digest_size=16).digest() + content)
-                os.replace(temporary, file)
-            except OSError:
-                os.unlink(temporary)
+        content = hashlib.blake2b(content, digest_size=16).digest() + content
+        for place in kernel_places():
+            with contextlib.suppress(OSError):
+                write_kernel(place, self._folder, file, content)
+                return
 
 
 def _code(library: Any) -> tuple[Any, ...]:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import hashlib
 import importlib
-from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 import llvmlite.binding as llvm
@@ -171,7 +170,7 @@ class OutlinedCompiler(CompilerBase):  # type: ignore[misc]
         """Return numba's own passes, for a symbol that is the same in every process with the same source."""
         state = self.state
         state.targetctx.mangler = _short_mangler  # of a copy that this compilation has for itself
-        state.func_id.unique_id = Path(folder(state.func_id.modname)).name
+        state.func_id.unique_id = folder(state.func_id.modname)
         state.library = OutlinedLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         return [DefaultPassBuilder.define_nopython_pipeline(state)]
 

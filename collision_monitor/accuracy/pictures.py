@@ -47,6 +47,7 @@ def draw_tradeoff(rows: Sequence[Measurement], path: Path) -> None:
         else:
             panel.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7)
         panel.grid(alpha=0.3)
+        panel.tick_params(axis="x", which="both", labelrotation=30)  # beside each other, the minor ones overlap
     figure.savefig(path, dpi=120)
 
 

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from collision_monitor.alerts.closest_approach import closest_approaches, sphere_approach
 from collision_monitor.alerts.measures import Array, Measures, Slots
 from collision_monitor.alerts.monitored_bodies import MonitoredBodies
-from collision_monitor.alerts.nearest_points import nearest_points_at
 from collision_monitor.alerts.quiet import quiet_pairs
 from collision_monitor.alerts.rules import Rule, Rules
 from collision_monitor.alerts.selection import Classes, select
@@ -19,6 +18,7 @@ from collision_monitor.alerts.traffic import post_encroachment_time, required_de
 from collision_monitor.broad_phase.box_pairs import box_pairs
 from collision_monitor.impact.impact_record import ids_of_keys, pair_keys
 from collision_monitor.monitor.candidates import filters_of, keep_checked
+from collision_monitor.monitor.nearest_points import nearest_points_at
 
 REACH: Final = 1.0 + 1e-9
 """Factor on distances that decide which pairs are measured, so that rounding loses none."""
@@ -106,7 +106,8 @@ def _measure(rule: Rule, classes: Classes, scene: MonitoredBodies, found: Measur
     """Measure the pairs from the states."""
     i, j, wanted = found.i, found.j, rule.measures
     limits = np.full(len(i), np.inf)
-    near = nearest_points_at(scene, i, j, np.full(len(i), scene.now), limits, widen=True)
+    now, acceleration = np.full(len(i), scene.now), scene.profile.stale_acceleration
+    near = nearest_points_at(scene.roster.multibody, i, j, now, limits, acceleration, scene.scratch)
     distance = near.distance - near.error
     found["distance"], found["distance_error"] = distance, 2.0 * near.error
     found["closing_speed"], found.points = near.closing, near.points

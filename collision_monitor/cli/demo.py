@@ -25,12 +25,8 @@ if TYPE_CHECKING:
 
 START_PATIENCE = 180.0
 """Time for the monitor to answer (s). Its first start on a machine may have to compile the kernels."""
-SILENCE = 5.0
-"""Time after which the demo prints why it waits for the monitor (s)."""
-FRAME = 0.25
-"""Time between two pictures (s)."""
-LINE = 1.0
-"""Time between two lines if the output is not a terminal (s)."""
+LOOK = 0.25
+"""Time between two looks at what the monitor says while it starts (s)."""
 
 DESCRIPTION = """\
 Run a simulated scene and a monitor as two processes, and show live which objects touch now and
@@ -126,6 +122,7 @@ def _watch(args: argparse.Namespace, session: Path, stop: StopRequest) -> bool:
     if args.objects is not None:
         scene += ["--objects", str(args.objects)]
     with Child("run", "--record", str(session), *_settings(args)) as monitor, ros_context([]):
+        from collision_monitor.cli.output.live_show import show_live
         from collision_monitor.ros.listening.viewer import Viewer
 
         viewer = Viewer()
@@ -133,7 +130,8 @@ def _watch(args: argparse.Namespace, session: Path, stop: StopRequest) -> bool:
         if stop.received:
             return False
         with Child(*scene) as world:
-            picture = _show(viewer, args.scene, [monitor, world], stop)
+            title = f"collision_monitor, scene {args.scene}"
+            picture = show_live(viewer, title, lambda: not stop.received and monitor.running() and world.running())
             if not stop.received:  # otherwise it may still be starting and has nothing to finish
                 world.finish()
         monitor.finish()
@@ -152,55 +150,15 @@ def _settings(args: argparse.Namespace) -> list[str]:
 
 def _wait_for_answer(viewer: Viewer, monitor: Child, stop: StopRequest) -> None:
     """Wait for the first status, which the monitor publishes as soon as it listens. Raises ProcessError."""
-    began, is_reported = time.monotonic(), False
+    began, said = time.monotonic(), ""
     while viewer.status is None and not stop.received:
-        viewer.listen(until=time.monotonic() + FRAME)
+        viewer.listen(until=time.monotonic() + LOOK)
         monitor.running()
-        if time.monotonic() > began + SILENCE and not is_reported:
-            is_reported = True
-            print("waiting for the monitor, which compiles kernels, once for this machine and version", flush=True)
+        if (found := re.findall(r"compiling .*", monitor.words())) and found[-1] != said:
+            said = found[-1]
+            print(f"the monitor is {said}", flush=True)
         if time.monotonic() > began + START_PATIENCE:
             raise ProcessError(f"collision-monitor run: expected a status within {START_PATIENCE:g} s, got none")
-
-
-def _show(viewer: Viewer, scene: str, children: list[Child], stop: StopRequest) -> LatestAnswers:
-    """Draw until the scene ends and return the last picture."""
-    from rich.console import Console
-    from rich.live import Live
-
-    console = Console()
-    period = FRAME if console.is_terminal else LINE
-    began = time.monotonic()
-    frame, heard_at = 0, None
-    picture = _picture(viewer, scene, 0.0)
-    with Live(console=console, auto_refresh=False, transient=True) as live:
-        while not stop.received and all([child.running() for child in children]):
-            frame += 1
-            viewer.listen(until=began + frame * period)
-            if viewer.contacts is None:
-                continue
-            heard_at = heard_at or time.monotonic()
-            picture = _picture(viewer, scene, time.monotonic() - heard_at)
-            if console.is_terminal:
-                live.update(picture.table(), refresh=True)
-            else:
-                print(picture.line(), flush=True)
-    if console.is_terminal:
-        console.print(picture.table())
-    return picture
-
-
-def _picture(viewer: Viewer, scene: str, elapsed: float) -> LatestAnswers:
-    from collision_monitor import codec
-    from collision_monitor.cli.output.live_table import LatestAnswers
-
-    return LatestAnswers(
-        title=f"collision_monitor, scene {scene}",
-        elapsed=elapsed,
-        contacts=None if viewer.contacts is None else codec.decode_contacts(viewer.contacts),
-        predictions=None if viewer.predictions is None else codec.decode_predictions(viewer.predictions),
-        status=codec.MonitorStatus() if viewer.status is None else codec.decode_status(viewer.status),
-    )
 
 
 def _capture(picture: LatestAnswers, path: Path) -> None:

@@ -17,8 +17,8 @@ from collision_monitor.cli.output.output_streams import accept_any_text, discard
 from collision_monitor.errors import CollisionMonitorError
 
 COMMANDS: Final = (
-    "demo", "run", "view", "sources", "rules", "world", "replay", "report", "compare",
-    "check", "conflicts", "salvage", "import", "tradeoff", "tune", "extremes", "bench",
+    "demo", "run", "top", "echo", "view", "sources", "rules", "world", "replay", "report", "compare",
+    "check", "conflicts", "salvage", "import", "tradeoff", "tune", "extremes", "bench", "warm-up",
 )  # fmt: skip
 """Commands in the order of `--help`. Each is a module of this package (`import_` for import) with an `add_parser`."""
 
@@ -31,6 +31,8 @@ EPILOG = """\
 examples:
   collision-monitor demo                                   live demo with a simulated scene
   collision-monitor run --record run.mcap                  run the monitor node and record a session
+  collision-monitor top                                    show the running monitor in this terminal
+  collision-monitor echo object_monitor/status             print the messages of a topic
   collision-monitor view                                   show the running monitor in the browser
   collision-monitor view run.mcap                          show a session, with a time line
   collision-monitor sources                                list topics of robots that it can monitor
@@ -48,6 +50,7 @@ examples:
   collision-monitor tune run.mcap --max-ttc-error 0.05     find the cheapest sufficient settings
   collision-monitor extremes                               measure errors at extreme scales
   collision-monitor bench --scene boxes --n 10000          measure the time to find all contacts
+  collision-monitor warm-up                                compile the kernels in advance
 
 exit codes:
   0    done
@@ -72,7 +75,7 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"%(prog)s {VERSION}")
     subparsers = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name in COMMANDS:
-        module = f"{name}_" if iskeyword(name) else name
+        module = f"{name}_" if iskeyword(name) else name.replace("-", "_")
         import_module(f"collision_monitor.cli.{module}").add_parser(subparsers)
     return parser
 

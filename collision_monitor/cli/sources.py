@@ -16,8 +16,9 @@ if TYPE_CHECKING:
 
 DESCRIPTION = """\
 List the topics on the ROS graph that the monitor understands, with their types, rates and frames, and
-print a sources file to start from. `collision-monitor run --sources FILE` monitors what such a file
-names, and `collision-monitor import --map FILE` imports a bag with it.
+print a sources file to start from. It listens until no new topic has come for 2 s and each has been
+heard; a topic without a rate had less than two messages. `collision-monitor run --sources FILE`
+monitors what such a file names, and `collision-monitor import --map FILE` imports a bag with it.
 
 With --check FILE, run the sources of a file for a while without a monitor, and report for each line
 what arrived, how many states it gave, and what was refused.
@@ -48,8 +49,9 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("--check", type=Path, metavar="FILE", help="sources file (YAML) to check against the graph")
     parser.add_argument(
-        "--seconds", type=positive_number, default=3.0, metavar="S", help="time to listen (s, default: 3)"
-    )
+        "--seconds", type=positive_number, metavar="S",
+        help="time to listen (s, default: until the graph is quiet; with --check 3)",
+    )  # fmt: skip
     parser.set_defaults(command=sources_command)
 
 
@@ -58,7 +60,7 @@ def sources_command(args: argparse.Namespace) -> int:
     from collision_monitor.ros.process import ros_context, stay_on_this_machine
 
     if args.check is not None:
-        return _check(args.check, args.seconds)
+        return _check(args.check, args.seconds or 3.0)
     stay_on_this_machine()
     with ros_context(["collision-monitor"]):
         from collision_monitor.ros.listening.survey import survey
@@ -99,17 +101,16 @@ def _check(path: Path, seconds: float) -> int:
 
 
 def _print_list(found: list[TopicFacts]) -> None:
-    from rich.console import Console
-    from rich.table import Column, Table
-
-    table = Table("topic", Column("type", no_wrap=True), "rate", "frames", box=None)
+    """Print two lines for each topic, since its name is to be copied whole and may be long."""
     for each in found:
         frames = sorted(each.frames) or [f"{parent} → {child}" for child, parent in sorted(each.parents.items())[:6]]
-        rate = f"{each.rate:.1f} Hz" if each.rate else "–"
-        missing = "" if each.installed else " (package not installed: make interfaces)"
-        table.add_row(each.topic, each.type.replace("/msg/", "/") + missing, rate, ", ".join(frames))
-    console = Console(stderr=True)
-    console.print(table if found else "no topic of a type that the monitor understands has a publisher")
+        rate = f", {each.rate:.1f} Hz" if each.rate else ", no rate: less than two messages"
+        missing = "" if each.installed else "; its package is not installed: make interfaces"
+        print(each.topic, file=sys.stderr)
+        kind = each.type.replace("/msg/", "/")
+        print(f"    {kind}{missing or rate}{', frames: ' if frames else ''}{', '.join(frames)}", file=sys.stderr)
+    if not found:
+        print("no topic of a type that the monitor understands has a publisher", file=sys.stderr)
 
 
 def _template(found: list[TopicFacts]) -> str:
@@ -118,5 +119,8 @@ def _template(found: list[TopicFacts]) -> str:
     parents: dict[str, str] = {}
     for each in found:
         parents |= each.parents
-    seen = [Seen(it.topic, it.type, tuple(sorted(it.frames)), tuple(sorted(it.markers))) for it in found]
+    seen = [
+        Seen(each.topic, each.type, tuple(sorted(each.frames)), tuple(sorted(each.markers)), frozenset(each.moved))
+        for each in found
+    ]
     return sources_file(seen, parents)

@@ -9,7 +9,7 @@ import math
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from collision_monitor.accuracy.tradeoff.default_scenes import DEFAULT_SCENES
 from collision_monitor.cli.options.quantities import not_negative, positive_number, whole
@@ -237,27 +237,44 @@ def _print_table(rows: Sequence[Measurement]) -> None:
 
     from collision_monitor.accuracy.tradeoff.measurement import labels_of_models
 
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
-    headings = ("scene", "profile\nor model", "ms/step", "µs/pair", "alarms", "false", "beyond", "missed")
-    for k, heading in enumerate(headings):
-        table.add_column(heading, justify="left" if k < 2 else "right", no_wrap=k > 0)
-    for heading in ("distance\nerror m", "TTC error s\nmedian", "\np99", "\nworst", "in bound\n%"):
-        table.add_column(heading, justify="right", no_wrap=True)
+    console = Console(width=None if sys.stdout.isatty() else 160)
+    columns = [each for each in _COLUMNS if each not in _ONLY_WIDE or console.width >= WIDE]
     of_models = labels_of_models(rows)
-    scene = ""
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, padding=(0, 1 if console.width >= WIDE else 0, 0, 0))
+    table.add_column("scene,\nprofile or model", overflow="fold")
+    for name in columns:
+        table.add_column(name, justify="right", no_wrap=True)
+    scene = None
     for row in rows:
-        if scene and row.label != scene:
-            table.add_section()
-        shown = "" if row.label == scene else row.label
+        if row.label != scene:
+            if scene is not None:
+                table.add_section()
+            table.add_row(f"[bold]{row.label}[/bold]")
         scene = row.label
-        error = row.ttc_error_s
-        numbers = (row.distance_error_m, error.median, error.p99, error.worst)
-        table.add_row(
-            shown, row.model if scene in of_models else row.profile, f"{row.step_ms:.3f}", f"{row.pair_us:.2f}",
-            str(row.alarms), str(row.false_alarms), str(row.beyond_exact), str(row.misses), *map(_number, numbers),
-            _percent(row.within_bound),
-        )  # fmt: skip
-    Console(width=None if sys.stdout.isatty() else 160).print(table)
+        values = _cells(row)
+        table.add_row(f"  {row.model if scene in of_models else row.profile}", *(values[name] for name in columns))
+    console.print(table)
+
+
+WIDE: Final = 110
+"""Columns of a terminal that shows all of a table's."""
+
+_COLUMNS: Final = (
+    *("ms/\nstep", "µs/\npair", "alarms\n", "false\n", "beyond\n", "missed\n", "distance\nerror m"),
+    *("TTC s\nmedian", "TTC s\np99", "TTC s\nworst", "in\nbound %"),
+)
+_ONLY_WIDE: Final = ("µs/\npair", "TTC s\nmedian")
+
+
+def _cells(row: Measurement) -> dict[str, str]:
+    error = row.ttc_error_s
+    values = (
+        *(f"{row.step_ms:.3f}", f"{row.pair_us:.2f}"),
+        *map(str, (row.alarms, row.false_alarms, row.beyond_exact, row.misses)),
+        *map(_number, (row.distance_error_m, error.median, error.p99, error.worst)),
+        _percent(row.within_bound),
+    )
+    return dict(zip(_COLUMNS, values, strict=True))
 
 
 def _flat(row: Measurement) -> dict[str, Any]:

@@ -139,6 +139,11 @@ def tune_command(args: argparse.Namespace) -> int:
     return ExitCode.DONE
 
 
+def _figure(value: float) -> str:
+    """A count whole, a number with three digits."""
+    return "–" if value != value else str(value) if isinstance(value, int) else f"{value:.3g}"
+
+
 def _as_text(trials: list[Trial], chosen: Profile | None, demands: Demands) -> list[str]:
     heads = ("ms/step", "p99", "alarms", "false", "distance m", "TTC p99 s", "steps")
     widths = (8, 8, 8, 8, 11, 10, 6)
@@ -152,7 +157,7 @@ def _as_text(trials: list[Trial], chosen: Profile | None, demands: Demands) -> l
             row.step_ms, row.step_ms_p99, row.alarms, row.false_alarms, row.distance_error_m, row.ttc_error_s.p99,
             row.steps,
         )  # fmt: skip
-        shown = " ".join(f"{x:>{w}.3g}" if x == x else f"{'–':>{w}}" for x, w in zip(numbers, widths, strict=True))
+        shown = " ".join(f"{_figure(x):>{w}}" for x, w in zip(numbers, widths, strict=True))
         good = "meets what could be tested" if demands.untested(row) else "meets all demands"
         lines.append(f"{mark}{each.profile.name:<{wide}} {shown}  {'; '.join(each.failures) or good}")
     return lines

@@ -14,6 +14,7 @@ from collision_monitor.cli.output.exit_codes import ExitCode
 from collision_monitor.cli.output.progress import session_bar
 from collision_monitor.errors import MessageError
 from collision_monitor.pipeline.topics import NODE
+from collision_monitor.ros.durations import spoken
 from collision_monitor.ros.process import StopRequest, ros_context, stay_on_this_machine
 from collision_monitor.view.server import LOOPBACK, PORT, start_server, stop_server
 
@@ -161,7 +162,7 @@ def _view_live(args: argparse.Namespace, stop: StopRequest) -> None:
                 if silence is None:
                     notes = [f"waiting for answers of /{monitor}"]
                 elif is_silent:
-                    notes.insert(0, f"NO ANSWERS for {silence:.0f} s: this is the past")
+                    notes.insert(0, f"NO ANSWERS for {spoken(silence)}: this is the past")
                 moment = replace(moment, is_known=moment.is_known and not is_silent)
                 view.show(moment, f"/{monitor}, step {moment.step}", notes)
             listener.listen(until=now + PERIOD)

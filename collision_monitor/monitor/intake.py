@@ -18,6 +18,7 @@ from collision_monitor.monitor.refusals import Refusals, some_ids
 from collision_monitor.monitor.state.roster import Roster
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 from collision_monitor.monitor.state.timeline import NANOSECOND, Order, Progress, Timeline
+from collision_monitor.monitor.state_rows import states_of
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
 from collision_monitor.motion.course import ARC, STRAIGHT, course_of, place_on
 from collision_monitor.motion.trigonometry import sin_cos
@@ -76,7 +77,7 @@ class Observation(NamedTuple):
     """The arguments of `Monitor.step`, as they were given."""
 
     stamp_ns: int
-    ids: ArrayLike
+    ids: Any
     poses: Any = None
     twists: Any = None
     covariance: Any = None
@@ -122,7 +123,7 @@ class Intake(Stage):
         elif given.dtype == records.STATE:
             states = self._own(given, is_written=covariance is not None)
         else:
-            states = _states(given, poses, twists)
+            states = states_of(given, poses, twists)
         if covariance is None:
             return states, np.empty((0, 12))
         covariances = as_numbers(covariance, "covariance", "an array of numbers")
@@ -217,7 +218,7 @@ class Intake(Stage):
 def checked_nanoseconds(value: Any, name: str) -> int:
     """Return a time as int. Raises InputError."""
     if not isinstance(value, int | np.integer) or isinstance(value, bool):
-        got = f"got {value!r:.100}; of seconds t write round(1e9 * t)"
+        got = f"got {value!r:.100}; of seconds t write round(1e9 * t){', or stamp=t' if name == 'stamp_ns' else ''}"
         raise InputError(f"{name}: expected an integer number of nanoseconds, {got}")
     if not -MOST_NANOSECONDS <= value < MOST_NANOSECONDS:
         raise InputError(f"{name}: expected nanoseconds that 64 bits can hold, got {value}")
@@ -251,27 +252,6 @@ def _age_text(roster: Roster, slot: int, time: float) -> str:
         return "it is static"
     age = float(roster.bodies.time[slot]) - time
     return f"got one that is {age:.3f} s older" if age > 0.0 else "got another one with the same stamp"
-
-
-def _states(ids: NDArray[Any], poses: Any, twists: Any) -> States:
-    """Build states from ids (N,), poses (N, 7) and twists (N, 6). Raises InputError."""
-    if ids.ndim != 1 or not np.issubdtype(ids.dtype, np.integer):
-        raise InputError(f"ids: expected one dimension of integers, got {ids.dtype} of shape {ids.shape}")
-    n = len(ids)
-    pose = as_numbers(poses, "poses and twists", "arrays of numbers")
-    twist = np.zeros((n, 6)) if twists is None else as_numbers(twists, "poses and twists", "arrays of numbers")
-    if pose.shape != (n, 7) or twist.shape != (n, 6):
-        raise InputError(
-            "expected ids (N,), poses (N, 7), x y z qx qy qz qw, and twists (N, 6), linear, angular; "
-            f"got shapes {ids.shape}, {pose.shape} and {twist.shape}"
-        )
-    if ids.min() < 0 or ids.max() >= 2**32:
-        raise InputError(f"ids: expected integers from 0 to 4294967295, got {ids.min()} to {ids.max()}")
-    states = np.zeros(n, records.STATE)
-    states["id"] = ids
-    states["position"], states["quaternion"] = pose[:, :3], pose[:, 3:]
-    states["linear"], states["angular"] = twist[:, :3], twist[:, 3:]
-    return states
 
 
 @direct

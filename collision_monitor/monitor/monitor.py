@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, Self
+from collections.abc import Iterable
+from typing import Any, Final, Self, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from collision_monitor.checks.numbers import checked_array
+from collision_monitor.checks.numbers import checked_array, checked_number
 from collision_monitor.errors import InputError, Refusal
 from collision_monitor.monitor.answers import mark_overtaken, step_status
 from collision_monitor.monitor.budget import PairBudget
@@ -18,17 +18,19 @@ from collision_monitor.monitor.intake import Observation, checked_nanoseconds
 from collision_monitor.monitor.plans import ENDED
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.monitor.stages import Stages
+from collision_monitor.monitor.state.object_names import ids_named
 from collision_monitor.monitor.state.snapshot import Snapshot, restore_stages
 from collision_monitor.monitor.state.timeline import Progress
 from collision_monitor.monitor.step_context import KernelSettings, StepContext
 from collision_monitor.motion.trajectory import Tolerance, Trajectory
 from collision_monitor.objects.chosen_model import chosen_model, model_within_error
-from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.objects.description import ALL_GROUPS, ObjectDescription
 from collision_monitor.objects.models import Modelled
 from collision_monitor.records import Model
 from collision_monitor.settings.profile import Profile
-from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.registry import Shape
+
+MOST_SECONDS: Final = 9e9
+"""Largest `stamp` (s); in ns it is near the largest number of 64 bits."""
 
 
 class Monitor(Stages):
@@ -41,11 +43,15 @@ class Monitor(Stages):
 
     >>> import collision_monitor as cm
     >>> monitor = cm.Monitor()
-    >>> monitor.add(1, cm.Box((1, 1, 1)), static=True, pose=cm.Pose())
-    >>> monitor.add(2, cm.Sphere(0.5))
-    >>> monitor.step(0, [2], [(2.5, 0, 0, 0, 0, 0, 1)], [(-1, 0, 0, 0, 0, 0)])
+    >>> monitor.add("wall", cm.Box((1, 1, 1)), static=True, pose=(0, 0, 0))
+    1
+    >>> monitor.add("ball", cm.Sphere(0.5))
+    2
+    >>> monitor.step(stamp=0.0, ids=["ball"], poses=[(2.5, 0, 0, 0, 0, 0, 1)], twists=[(-1, 0, 0, 0, 0, 0)])
     StepResult(step 1 at 0 ns: 0 contacts, 0 ended, 1 predictions)
-      prediction: 1 and 2 in 1... to 1.5... s
+      prediction: wall and ball in 1... to 1.5... s
+    >>> monitor.nearest("wall").name, monitor.distance("wall", "ball")
+    ('ball', 1.5)
     """
 
     def __init__(self, profile: str | Profile = "balanced", *, timed: bool = True, warns: bool = True) -> None:
@@ -91,27 +97,54 @@ class Monitor(Stages):
     # ------------------------------------------------------------------ objects
 
     def add(
-        self, object_id: int, shape: Shape | Sequence[tuple[Shape, Pose]], *, replace: bool = False, **fields: Any
-    ) -> None:
-        """Add an object of one shape, or of several with their poses in its frame.
+        self,
+        object_id: int | str,
+        shape: Any,
+        *,
+        name: str = "",
+        static: bool = False,
+        pose: Any = None,
+        group: int = 1,
+        mask: int = ALL_GROUPS,
+        padding: float = 0.0,
+        model: Model | str = Model.AUTO,
+        allowed: Iterable[int | str] = (),
+        max_linear_acceleration: float = 0.0,
+        max_angular_acceleration: float = 0.0,
+        replace: bool = False,
+    ) -> int:
+        """Add an object of one shape, or of several with their poses in its frame. Return its id.
 
-        replace: describe a known object anew; it keeps its state. The other fields are those of `ObjectDescription`:
-        name, static, pose, group, mask, padding, model, allowed, max_linear_acceleration, max_angular_acceleration.
+        object_id: a number, or a name alone, for which the next free id is taken. shape: a shape, an object of trimesh,
+        or a list of (shape, pose). static: it stands at `pose`: a Pose, (x, y, z), 7 numbers or a matrix (4, 4).
+        allowed: ids or names of the objects that it may touch. padding: m; accelerations: m/s^2 and rad/s^2. The fields
+        are those of `ObjectDescription`. replace: describe a known object anew; it keeps its state.
         Raises InputError for a known id without replace and for the pose of an object that is not static, and the
         errors of `describe`.
         """
-        description = ObjectDescription(object_id, shape, **fields)
+        if isinstance(object_id, str):
+            name = name or object_id
+            object_id = self.id_of(object_id) if replace else max(self.ids, default=0) + 1
+        is_list = isinstance(allowed, Iterable) and not isinstance(allowed, str)
+        description = ObjectDescription(
+            *(object_id, shape, name, static, pose, group, mask, padding),
+            model=cast(Model, model),  # or its name
+            allowed=tuple(map(self.id_of, allowed)) if is_list else cast(Any, allowed),
+            max_linear_acceleration=max_linear_acceleration,
+            max_angular_acceleration=max_angular_acceleration,
+        )
         if description.pose is not None and not description.static:
             raise InputError(
                 f"object {object_id}: expected pose= of a static object only, got one of an object that moves; "
                 "write static=True, or pass the pose to step"
             )
-        if not replace and object_id in self._roster:
+        if not replace and description.object_id in self._roster:
             raise InputError(
                 f"object {object_id}: expected a new id, got that of {self.name(object_id)!r}; "
                 "write replace=True to describe it anew, or remove it first"
             )
         self.describe(description)
+        return description.object_id
 
     def describe(self, description: ObjectDescription, prepared: Modelled | None = None) -> None:
         """Add a new object, or replace the description of a known one and keep its state.
@@ -139,8 +172,9 @@ class Monitor(Stages):
         """
         return chosen_model(description, self._profile)
 
-    def remove(self, object_id: int) -> None:
-        """Forget an object; its contacts end. Raises InputError for an unknown id."""
+    def remove(self, object_id: int | str) -> None:
+        """Forget an object, given by id or name; its contacts end. Raises InputError for an unknown one."""
+        object_id = self.id_of(object_id)
         i = self._roster.slot(object_id)
         self._active_pairs.end(self._active_pairs.of_body(i))
         self._candidates.forget(np.array([i], np.int32))
@@ -150,7 +184,7 @@ class Monitor(Stages):
 
     def follow(
         self,
-        object_id: int,
+        object_id: int | str,
         plan: Trajectory | None,
         *,
         stamp_ns: int | None = None,
@@ -166,6 +200,7 @@ class Monitor(Stages):
         Raises InputError for an unknown or static object, a plan that is over or unknown after its end, and a tolerance
         that is no Tolerance of numbers from 0.
         """
+        object_id = self.id_of(object_id)
         i = self._roster.slot(object_id)
         if plan is None:
             self._plans.drop(self._roster, np.array([i], np.int32))
@@ -206,29 +241,43 @@ class Monitor(Stages):
 
     def step(
         self,
-        stamp_ns: int,
-        ids: ArrayLike,
+        stamp_ns: int | None = None,
+        ids: Any = (),
         poses: Any = None,
         twists: Any = None,
         covariance: Any = None,
         *,
+        stamp: float | None = None,
         now_ns: int | None = None,
     ) -> StepResult:
-        """Observe the states of some objects at `stamp_ns` and report on all objects at the latest time so far.
+        """Observe the states of some objects at a time and report on all objects at the latest time so far.
 
-        Pass either ids (N,), poses (N, 7: position, quaternion xyzw) and twists (N, 6: linear, angular; default 0), or
-        a structured array of records.STATE as `ids`. World frame, SI units.
+        stamp_ns: the time in ns, an integer; or `stamp`, in s. Pass either ids (N,), or names, with poses (N, 7:
+        position, quaternion xyzw; also matrices (N, 4, 4) or a list of Pose) and twists (N, 6: linear, angular), or a
+        structured array of records.STATE as `ids`. World frame, SI units. Without twists, the velocity of each object
+        is estimated from its last pose and this one, and is 0 in its first state.
         covariance (N, 12): upper triangles, row by row, of the covariances of position and linear velocity. They
         replace the standard deviations in the states.
         now_ns: when the answers will be there, by the clock of the stamps. A predicted collision that begins before
         then is UNRESOLVED, because the prediction is older than what it predicts. None: not known.
         Unusable rows and stamps that jump are refused: the result lists them (`refused`), they raise nothing, and the
-        first of each kind is a RefusalWarning. Raises InputError for arrays of another shape.
+        first of each kind is a RefusalWarning. Raises InputError for arrays of another shape and for unknown names.
         """
+        if (stamp_ns is None) == (stamp is None):
+            got = "neither" if stamp is None else f"both: {stamp_ns!r:.40} and {stamp!r:.40}"
+            raise InputError(f"step: expected stamp_ns (nanoseconds) or stamp (s), got {got}")
+        if stamp is not None:
+            stamp_ns = round(1e9 * checked_number(stamp, "stamp", "s", least=-MOST_SECONDS, most=MOST_SECONDS))
         with self.clock:
-            result = self.take_step(Observation(stamp_ns, ids, poses, twists, covariance, now_ns))
+            given = Observation(cast(int, stamp_ns), self._numbered(ids), poses, twists, covariance, now_ns)
+            result = self.take_step(given)
         self._refusals.warn(result.refused)
         return result
+
+    def _numbered(self, ids: Any) -> Any:
+        """The ids of names; ids as they are. Raises InputError for a name that not exactly one object has."""
+        are_names = isinstance(ids, list | tuple | np.ndarray) and len(ids) > 0 and isinstance(ids[0], str)
+        return ids_named(self._roster.names, map(str, ids)) if are_names else ids
 
     def take_step(self, given: Observation) -> StepResult:
         """As `step`, for a caller that has entered `clock` and does more in it. Refusals are no warnings here."""
@@ -258,6 +307,7 @@ class Monitor(Stages):
             overtaken=overtaken,
             samples=step.samples,
             left=tuple(sorted(roster.bodies.id[left].tolist())),
+            roster=roster,
         )
         return self._answers.finish(result)
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import Refusal
 from collision_monitor.records import Phase, data_frame
+
+if TYPE_CHECKING:
+    from collision_monitor.monitor.state.roster import Roster
 
 
 @dataclass
@@ -74,11 +77,12 @@ class StepResult:
     status are those of the last accepted step. cut: number of pairs that were examined before the budget ran out;
     None: all pairs were examined. overtaken: number of predictions that are UNRESOLVED because of the states' age.
     samples: number of samples of uncertain states that were followed for the times and probabilities of all pairs.
-    left: ids of the objects that left their plans in this step, see `Monitor.follow`.
+    left: ids of the objects that left their plans in this step, see `Monitor.follow`. roster: knows their names.
 
     >>> import collision_monitor as cm
     >>> monitor = cm.Monitor()
-    >>> monitor.add(1, cm.Sphere(0.5))
+    >>> monitor.add("ball", cm.Sphere(0.5))
+    1
     >>> monitor.step(0, [1], [(0, 0, 0, 0, 0, 0, 1)]).contacts.shape
     (0,)
     """
@@ -94,6 +98,15 @@ class StepResult:
     overtaken: int = 0
     samples: int = 0
     left: tuple[int, ...] = ()
+    roster: Roster | None = field(default=None, repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Copies and pickles hold the answers alone."""
+        return self.__dict__ | {"roster": None}
+
+    def name(self, object_id: int) -> str:
+        """Name of an object, as the monitor knows it by now; its id in words if it is gone."""
+        return self.roster.name(object_id) if self.roster and object_id in self.roster else f"object {object_id}"
 
     @cached_property
     def contacts(self) -> NDArray[np.void]:
@@ -106,18 +119,18 @@ class StepResult:
         return self.contact_rows.compress(self.contact_rows["phase"] == Phase.END)
 
     def __repr__(self) -> str:
-        """Return the answers as lines for a person; refusals first."""
+        """Return the answers as lines for a person, with the names of the objects; refusals first."""
+
+        def pair(row: np.void) -> str:
+            return f"{self.name(int(row['id_a']))} and {self.name(int(row['id_b']))}"
+
         lines = [f"refused: {each.text}" + f" ({each.count} of these)" * (each.count > 1) for each in self.refused]
-        lines += [f"left its plan: {object_id}" for object_id in self.left[:SHOWN]]
+        lines += [f"left its plan: {self.name(object_id)}" for object_id in self.left[:SHOWN]]
         lines += [
-            f"contact: {c['id_a']} and {c['id_b']}, {c['signed_distance']:.4g} m ± {c['error_bound']:.1g}"
-            for c in self.contacts[:SHOWN]
+            f"contact: {pair(c)}, {c['signed_distance']:.4g} m ± {c['error_bound']:.1g}" for c in self.contacts[:SHOWN]
         ]
-        lines += [f"ended: {c['id_a']} and {c['id_b']}" for c in self.ended[:SHOWN]]
-        lines += [
-            f"prediction: {p['id_a']} and {p['id_b']} in {p['lower']:.4g} to {p['upper']:.4g} s"
-            for p in self.predictions[:SHOWN]
-        ]
+        lines += [f"ended: {pair(c)}" for c in self.ended[:SHOWN]]
+        lines += [f"prediction: {pair(p)} in {p['lower']:.4g} to {p['upper']:.4g} s" for p in self.predictions[:SHOWN]]
         what = "" if self.accepted else ", refused"
         counts = f"{len(self.contacts)} contacts, {len(self.ended)} ended, {len(self.predictions)} predictions"
         return "\n  ".join([f"StepResult(step {self.step} at {self.stamp_ns} ns{what}: {counts})", *lines])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collision_monitor.errors import Refusal
+import numpy as np
+
+from collision_monitor.errors import InputError, Refusal
 from collision_monitor.monitor.active_pairs import ActivePairs
 from collision_monitor.monitor.answers import Answers
 from collision_monitor.monitor.budget import StepClock
@@ -10,10 +12,12 @@ from collision_monitor.monitor.candidates import Candidates
 from collision_monitor.monitor.event_list import EventList
 from collision_monitor.monitor.first_impacts import FirstImpacts
 from collision_monitor.monitor.intake import Intake
+from collision_monitor.monitor.nearest_points import Neighbour, nearest_points_at, neighbour_of
 from collision_monitor.monitor.plans import Plans
 from collision_monitor.monitor.refusals import Refusals
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.monitor.scene_plan import ScenePlan, scene_plan
+from collision_monitor.monitor.state.object_names import ids_named
 from collision_monitor.monitor.state.roster import Roster
 from collision_monitor.monitor.state.snapshot import Snapshot, Stage, save_stages
 from collision_monitor.monitor.state.timeline import Timeline
@@ -77,6 +81,36 @@ class Stages:
     def name(self, object_id: int) -> str:
         """Name of an object, for display. Raises InputError for an unknown id."""
         return self._roster.name(object_id)
+
+    def id_of(self, given: int | str) -> int:
+        """Id of an object that is given by its id or by its name. Raises InputError for a name that is not of one."""
+        return ids_named(self._roster.names, [given])[0] if isinstance(given, str) else given
+
+    # ------------------------------------------------------------------ distances on demand
+
+    def distance(self, a: int | str, b: int | str) -> float:
+        """Signed distance (m) of two objects at the latest time, by their last states: negative if they overlap.
+
+        Objects are given by id or name. Raises InputError for an unknown one, and for one without a state.
+        """
+        i, j = (np.array([self._seen_slot(each)], np.int32) for each in (a, b))
+        now, limit = np.array([self._timeline.now]), np.array([np.inf])
+        scratch = self._first_impacts.scratch
+        return float(nearest_points_at(self._roster.multibody, i, j, now, limit, 0.0, scratch).distance[0])
+
+    def nearest(self, a: int | str) -> Neighbour | None:
+        """The object nearest to another one at the latest time, of those that are checked against it; None: none is.
+
+        The object is given by id or name. Raises InputError for an unknown one, and for one without a state.
+        """
+        slot, scratch = self._seen_slot(a), self._first_impacts.scratch
+        return neighbour_of(self._roster, slot, self._timeline.now, self._profile.stale_acceleration, scratch)
+
+    def _seen_slot(self, given: int | str) -> int:
+        slot = self._roster.slot(self.id_of(given))
+        if not self._roster.bodies.seen[slot]:
+            raise InputError(f"{given!r}: expected an object with a state, got one that no step has had; pass its pose")
+        return slot
 
     @property
     def stale_ids(self) -> list[int]:

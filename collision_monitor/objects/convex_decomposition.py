@@ -52,7 +52,7 @@ COARSE: Final = 1e-3
 NEAREST_CENTRES: Final = 16
 """Faces, by their centres, among which the nearest is sought. Fewer: the stated error is larger than necessary."""
 
-INSTALL: Final = 'pip install "collision_monitor[decomposition]"'
+INSTALL: Final = "pip install '.[decomposition]' in a clone"
 
 
 class Decomposition(NamedTuple):

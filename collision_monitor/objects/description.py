@@ -12,7 +12,7 @@ from collision_monitor.checks.numbers import checked_number
 from collision_monitor.errors import InputError, ShapeError
 from collision_monitor.records import Model
 from collision_monitor.shapes.compound import shape_pairs
-from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.pose import Pose, as_pose
 from collision_monitor.tolerances import LARGEST_INPUT
 
 ALL_GROUPS = 0xFFFFFFFF
@@ -65,9 +65,10 @@ class ObjectDescription:
     """One object, as in `ObjectDescription.msg`; lengths in m, accelerations in m/s^2 and rad/s^2.
 
     `shapes` may be given as one shape and is stored as a tuple of (shape, pose in the object's frame). `pose` is the
-    pose of a static object in the world frame, None otherwise. `name` has at most MOST_NAME_BYTES of UTF-8. Values that
-    the message may omit get their defaults here: an empty name, a group or mask of 0, an acceleration of NaN.
-    Raises InputError; ShapeError for the shapes.
+    pose of a static object in the world frame (also x y z, 7 numbers or a matrix), None otherwise. `name` has at most
+    MOST_NAME_BYTES of UTF-8. Values that the message may omit get their defaults here: an empty name, a group or mask
+    of 0, an acceleration of NaN.
+    Raises InputError; ShapeError for the shapes, PoseError for the pose.
 
     >>> from collision_monitor.shapes.registry import Sphere
     >>> ObjectDescription(7, Sphere(0.5), name="ball").name
@@ -101,13 +102,12 @@ class ObjectDescription:
             raise ShapeError(f"{what}: expected at most {MOST_SHAPES} shapes, got {len(shapes)}; use a Mesh or a hull")
         if self.static and self.pose is None:
             raise InputError(f"{what}: a static object needs the pose where it stands, got None")
-        if self.pose is not None and not isinstance(self.pose, Pose):
-            raise InputError(f"{what}, pose: expected a Pose, got {type(self.pose).__name__}")
         checked = {
             "object_id": object_id,
             "shapes": shapes,
             "name": _name(self.name, what) or f"object_{object_id}",
             "static": bool(self.static),
+            "pose": None if self.pose is None else as_pose(self.pose, f"{what}, pose"),
             "group": _uint32(self.group, f"{what}, group") or 1,
             "mask": _uint32(self.mask, f"{what}, mask") or ALL_GROUPS,
             "padding": checked_number(self.padding, f"{what}, padding", "metres", least=0.0, most=LARGEST_INPUT),

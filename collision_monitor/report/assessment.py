@@ -51,6 +51,13 @@ def counted(count: int, what: str) -> str:
     return f"{count} {what}{'' if count == 1 else 's'}"
 
 
+OTHERWISE: Final = (
+    "the objects did not go on as their states said: straight on, also of an object that turns, unless its state has "
+    "BODY_TWIST or it has a plan"
+)
+"""Why a prediction can be wrong; a robot that keeps its speed and its turn has changed nothing."""
+
+
 def _were(count: int) -> str:
     return f"{count} {'was' if count == 1 else 'were'}"
 
@@ -66,8 +73,8 @@ def _findings(facts: ReportFacts) -> list[str]:
     wrong = [each for each in facts.answered if stated_error(facts.answered[each], each, facts.period)[0] != 0.0]
     if wrong:
         lines.append(
-            f"the first prediction of {len(wrong)} stated an interval without the contact, because the objects changed "
-            "their motion; later predictions corrected it"
+            f"the first prediction of {len(wrong)} stated an interval without the contact, because {OTHERWISE}; later "
+            "predictions corrected it"
         )
     if facts.surprises:
         lines.append(f"{len(facts.surprises)} had no prediction right before the contact")
@@ -78,7 +85,7 @@ def _findings(facts: ReportFacts) -> list[str]:
     if judged.false_alarms:
         lines.append(
             f"{judged.false_alarms} of {judged.alarms} alarms (pairs × steps) were false, without a contact within the "
-            "horizon: the objects changed their motion, or passed each other within the tolerance"
+            f"horizon: {OTHERWISE}, or they passed each other within the tolerance"
         )
     due = sum(each[-1].certain and each[-1].outcome is AlertOutcome.OPEN for each in facts.alerts.values())
     if due:

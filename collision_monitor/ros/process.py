@@ -9,11 +9,12 @@ from __future__ import annotations
 import os
 import signal
 import sys
+import tempfile
 import threading
 import time
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import FrameType
 from typing import TYPE_CHECKING, Final
@@ -140,14 +141,25 @@ def ros_context(arguments: Sequence[str] | None = None) -> Iterator[None]:
         ) from None
 
     given = list(sys.argv if arguments is None else arguments)
+    _find_place_for_log()
     try:
         rclpy.init(args=given, signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:  # rclpy's own error classes are not public
+        if "logging directory" in str(error):
+            raise InputError("expected a folder for the log of ROS that can be written to: set ROS_LOG_DIR") from None
         raise InputError(f"expected ROS arguments (--ros-args -p name:=value …), got: {error}") from None
     try:
         yield
     finally:
         rclpy.try_shutdown()
+
+
+def _find_place_for_log() -> None:
+    """Let ROS log into a new temporary folder if the user has no home that can be written to; it would not start."""
+    home = os.environ.get("HOME", "")
+    if not {"ROS_LOG_DIR", "ROS_HOME"} & os.environ.keys() and not (home and os.access(home, os.W_OK)):
+        with suppress(OSError):
+            os.environ["ROS_LOG_DIR"] = tempfile.mkdtemp(prefix="ros_log_")
 
 
 def spin(node: Node, stop: StopRequest, *, events: bool = False) -> None:

@@ -155,7 +155,7 @@ def _on_ray(
         import ray
     except ImportError:
         raise UnsupportedError(
-            "--engine ray needs Ray, which is not installed: pip install 'collision_monitor[ray]'"
+            "--engine ray needs Ray, which is not installed: pip install '.[ray]' in a clone"
         ) from None
     if engine.address is not None:
         _reach(engine.address)

@@ -34,12 +34,13 @@ _SIZED: Final = (ODOMETRY, POSE, POSE_WITH_COVARIANCE)
 
 
 class Seen(NamedTuple):
-    """A topic on the graph. namespaces: of its markers."""
+    """A topic on the graph. namespaces: of its markers. moved: those of them that moved while somebody listened."""
 
     topic: str
     type: str
     frames: tuple[str, ...] = ()
     namespaces: tuple[str, ...] = ()
+    moved: frozenset[str] = frozenset()
 
 
 def sources_file(topics: Iterable[Seen], parents: dict[str, str]) -> str:
@@ -56,7 +57,9 @@ def sources_file(topics: Iterable[Seen], parents: dict[str, str]) -> str:
         if each.type in (MARKER, MARKERS):
             for namespace in each.namespaces:
                 name = _name(namespace or each.topic, used)
-                lines.append(f"  {name}: {{topic: {each.topic}, marker: {{ns: {namespace!r}}}}}")
+                still = "" if namespace in each.moved else ", static: true"
+                note = "   # they did not move" if still else ""
+                lines.append(f"  {name}: {{topic: {each.topic}, marker: {{ns: {namespace!r}}}{still}}}{note}")
         elif each.type in _ENTRIES:
             note = "   # its real shape, in m" if each.type in _SIZED else ""
             lines.append(f"  {_name(each.topic, used)}: {{topic: {each.topic}, {_ENTRIES[each.type]}}}{note}")

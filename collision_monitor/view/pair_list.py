@@ -12,7 +12,11 @@ from collision_monitor.settings.names import shortened
 from collision_monitor.view.levels import Level, Pair, contact_levels, prediction_levels
 from collision_monitor.view.moment import Moment
 
-LONGEST_NAME: Final = 20
+WIDEST: Final = 44
+"""Characters of a row that the panel shows; it cuts off the rest, at the second name."""
+
+SHORTEST_NAME: Final = 8
+"""Characters of a name that are left if the time is long."""
 
 
 class PairRow(NamedTuple):
@@ -27,7 +31,11 @@ class PairRow(NamedTuple):
     @property
     def text(self) -> str:
         """One line for people."""
-        return f"{self.when}  {shortened(self.names[0], LONGEST_NAME)} – {shortened(self.names[1], LONGEST_NAME)}"
+        room = max(WIDEST - len(self.when) - len("   – "), 2 * SHORTEST_NAME)
+        first, second = sorted(self.names, key=len)
+        short = shortened(first, max(room // 2, room - len(second)))
+        by_name = {first: short, second: shortened(second, room - len(short))}
+        return f"{self.when}  {by_name[self.names[0]]} – {by_name[self.names[1]]}"
 
 
 def soonest_pairs(moment: Moment, most: int) -> list[PairRow]:

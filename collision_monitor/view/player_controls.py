@@ -7,7 +7,6 @@ from queue import SimpleQueue
 from typing import TYPE_CHECKING, Any, Final
 
 from collision_monitor.settings.names import shortened
-from collision_monitor.view.pair_list import LONGEST_NAME
 from collision_monitor.view.panel import Request
 from collision_monitor.view.player import Player
 from collision_monitor.view.recording import Beginning, RecordedSteps
@@ -21,6 +20,8 @@ LISTED: Final = 200
 
 MARKS: Final = 16
 """Contacts that the slider marks. More marks would hide it."""
+
+LONGEST_NAME: Final = 20
 
 _CHOOSE: Final = "–"
 

@@ -17,7 +17,8 @@ def state_html(title: str, moment: Moment, notes: list[str]) -> str:
     if not moment.is_known:
         notes = [*notes, "touching and predicted pairs are not known"]
     touching = int(np.count_nonzero((contacts["phase"] != Phase.END) & (contacts["point_index"] == 0)))
-    counts = [f"{len(moment.ids)} objects", f"{touching} touching", f"{len(predictions)} predicted"]
+    objects = f"{len(moment.ids)} object{'' if len(moment.ids) == 1 else 's'}"
+    counts = [objects, f"{touching} touching", f"{len(predictions)} predicted"]
     unresolved = int(np.count_nonzero(predictions["status"] == PredictionStatus.UNRESOLVED))
     if unresolved:
         counts.append(f"{unresolved} unresolved")

@@ -208,7 +208,7 @@ OPENERS = {
     "cli/output/output_streams.py": "writes",
     "_jit/cache.py": "reads the files of this package",
     "_jit/imports.py": "reads the files of this package",
-    "_jit/kernel_cache.py": "reads the cache of compiled kernels",
+    "_jit/places.py": "reads the cache of compiled kernels",
 }
 
 

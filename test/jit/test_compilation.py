@@ -11,7 +11,7 @@ import pytest
 
 PROGRAM = """
 from collision_monitor._jit import kernel
-from collision_monitor._jit.compilation import on_first_compilation
+from collision_monitor._jit.compilation import telling_compilation
 
 @kernel
 def double(x):
@@ -21,13 +21,13 @@ def double(x):
 def triple(x):
     return 3.0 * x
 
-with on_first_compilation(lambda: print("compiling")):
+with telling_compilation(print, 2, every=1e9):
     assert double(1.0) + triple(1.0) == 5.0
 double(1)  # another type: compiled outside of the block
 """
 
 
-LOADING = PROGRAM.partition("with on_first")[0] + """
+LOADING = PROGRAM.partition("with telling")[0] + """
 from collision_monitor._jit.compilation import compiling_nothing
 
 with compiling_nothing():
@@ -54,14 +54,14 @@ def test_only_a_compilation_is_noticed_and_only_the_first(tmp_path: Path) -> Non
         subprocess.run([sys.executable, program], env=environment, capture_output=True, text=True, check=True).stdout
         for _ in range(2)
     ]
-    assert outputs == ["compiling\n", ""]
+    assert outputs == ["compiling the kernels, once for this machine and version\n", ""]
 
 
 TALKING = """
 import logging, sys
 logging.basicConfig(stream=sys.stdout, level=logging.INFO, format="%(name)s")
 from collision_monitor import _jit
-from collision_monitor._jit.compilation import on_first_compilation
+from collision_monitor._jit.compilation import telling_compilation
 
 def double(x):
     return 2.0 * x
@@ -75,7 +75,7 @@ double = _jit.kernel(double)
     ("call", "said"),
     [
         ("double(1.0); double(1)", "collision_monitor"),
-        ("with on_first_compilation(lambda: print('itself')): double(1.0)", "itself"),
+        ("with telling_compilation(lambda text: print('itself'), 1, 1e9): double(1.0)", "itself"),
         ("double.py_func(1.0)", ""),
     ],
 )
@@ -90,4 +90,4 @@ def test_a_terminal_and_the_log_say_once_that_a_kernel_is_compiled(call: str, sa
     os.close(its)
     assert done.returncode == 0, shown
     assert done.stdout.strip() == said
-    assert shown.count("warm_up` compiles all") == (said == "collision_monitor")
+    assert shown.count("warm-up` compiles all") == (said == "collision_monitor")

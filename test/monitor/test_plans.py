@@ -144,7 +144,7 @@ def test_a_body_that_leaves_its_plan_goes_on_as_its_state_says() -> None:
     monitor.step(0, moving(states([1, 2], turns, 0.0)))
     result = monitor.step(STEP, moving(states([1, 2], turns, 0.05, np.array([(0, 0.15, 0), (0, 0, 0)]))))
     assert result.left == (1,) and monitor.following == [2]
-    assert "left its plan: 1" in repr(result)
+    assert "left its plan: object_1" in repr(result)
     assert len(result.predictions) == 0
     result = monitor.step(2 * STEP, moving(states([1, 2], turns, 0.1, np.array([(0, 0.15, 0), (0, 0, 0)]))))
     assert result.left == ()

@@ -36,7 +36,7 @@ def test_contacts_that_ended_stand_apart(monitor: cm.Monitor) -> None:
     assert len(first.contacts) == 1 and not len(first.ended)
     second = monitor.step(SECOND // 10, [1, 2], APART)
     assert not len(second.contacts) and (second.ended["id_a"], second.ended["id_b"]) == (1, 2)
-    assert "ended: 1 and 2" in repr(second)
+    assert "ended: object_1 and object_2" in repr(second)
     third = monitor.step(SECOND // 5, [1, 2], APART)
     assert not len(third.contacts) and not len(third.ended)
 

@@ -42,7 +42,7 @@ def test_what_the_message_may_leave_out_is_filled_in():
         ({"name": "ü" * 129}, "got 258 bytes"),
         ({"name": "a\0b"}, "without zero bytes, got 'a.x00b'"),
         ({"name": "\ud800"}, "UTF-8 can hold"),
-        ({"pose": (0, 0, 0)}, "expected a Pose"),
+        ({"pose": (0, 0)}, "expected a Pose"),
         ({"padding": -0.1}, "padding"),
         ({"padding": math.nan}, "padding"),
         ({"padding": "wide"}, "padding"),

@@ -63,7 +63,7 @@ def test_the_number_of_jobs_does_not_matter() -> None:
 def test_without_ray_it_is_said_what_to_install() -> None:
     if find_spec("ray") is not None:
         pytest.skip("Ray is installed")
-    with pytest.raises(UnsupportedError, match=r"pip install 'collision_monitor\[ray\]'"):
+    with pytest.raises(UnsupportedError, match=r"pip install '.\[ray\]'"):
         list(for_each(work, [Path("a")], failed, Engine("ray")))
 
 

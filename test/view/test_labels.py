@@ -27,6 +27,18 @@ def test_a_label_keeps_its_key_while_its_text_and_rank_change() -> None:
     assert after[1].place.tolist() == [1, 2, 3]
 
 
+@pytest.mark.parametrize("when", ["now", "≥ 0.25 s, unresolved, stale"])
+def test_a_row_of_the_list_shows_the_beginnings_and_ends_of_both_names(when: str) -> None:
+    """The panel cut the second name off where the first one or the time was long."""
+    names = "hall_2/robot_with_a_trailer_17", "cart_3"
+    for first, second in (names, names[::-1]):
+        text = PairRow((1, 2), (first, second), when, Level.PREDICTED, None).text
+        assert len(text) <= 48
+        assert "cart_3" in text
+        long = text.removeprefix(when).strip().split(" – ")[first == "cart_3"]
+        assert long.startswith("hall") and long.endswith("17")
+
+
 def test_a_pair_without_a_place_has_no_label() -> None:
     assert labels(TopicContent().moment(), [row(1, 2, "now")], None, np.zeros(3), 10.0, 1.0) == []
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import Final
@@ -20,6 +21,13 @@ _OPTIONS: Final = {
     "horizon": "--min-horizon",
 }
 """The options of `tune`, which errors name."""
+
+_REASONS: Final = {
+    "distance error": "it is that of the shapes, or of models that the descriptions demand",
+    "TTC error": "the states of the recording are not more exact: a finer setting cannot know what they do not say",
+    "step time": "so many objects take that long on this machine; a shorter horizon or a smaller region takes less",
+}
+"""What is left if no setting meets a demand."""
 
 MOST_SAMPLES: Final = 4096
 """Largest value of uncertainty_samples."""
@@ -94,6 +102,15 @@ class Demands:
         }
         found = [lacking[name] for name, value, _, _ in self._measured(row, median=True) if value != value]
         return [f"{_OPTIONS[name]}: the session has no {what}, so that it could not be tested" for name, what in found]
+
+    def hopeless(self, rows: Sequence[Measurement]) -> list[str]:
+        """Return a sentence for each demand that none of the rows meets alone, with the least value and its reason."""
+        found = []
+        for name, _, most, unit in self._measured(rows[0], median=True):
+            values = [value for row in rows for each, value, _, _ in self._measured(row, median=True) if each == name]
+            if all(value > most for value in values):
+                found.append(f"{name} of {most:g} {unit}: the least was {min(values):.3g} {unit}; {_REASONS[name]}")
+        return found
 
     def excess(self, row: Measurement) -> float:
         """Return the largest factor by which a row exceeds a demand; infinite with a miss or a wrong bound."""

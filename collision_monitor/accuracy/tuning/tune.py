@@ -26,7 +26,7 @@ ProgressBar = Callable[[str, int], AbstractContextManager[Callable[[int], None]]
 
 @dataclass(frozen=True)
 class Tuned:
-    """chosen: None if no profile meets the demands. trials: all, cheapest first. reasons: three lines for a person.
+    """chosen: None if no profile meets the demands. trials: all, cheapest first. reasons: lines for a person.
 
     untested: a sentence for each demand that the chosen profile meets only because the recording lacks such answers.
     """
@@ -82,13 +82,17 @@ def _choice(trials: list[Trial]) -> Trial | None:
 
 
 def explain(chosen: Trial | None, trials: list[Trial], demands: Demands) -> list[str]:
-    """Return three lines: what was chosen, what a cheaper choice fails, and what a more accurate one costs."""
+    """Return lines: what was chosen, what a cheaper choice fails, and what a more accurate one costs.
+
+    If none is good: which demands no profile meets, and why.
+    """
     if chosen is None:
         nearest = min(trials, key=lambda each: demands.excess(each.measurement))
         safe = [each for each in trials if not each.measurement.misses and not each.measurement.outside_bound]
         finest = min(safe or trials, key=lambda each: each.error)
         return [
             f"none of {len(trials)} profiles meets all demands ({demands})",
+            *(f"no setting helps: {text}" for text in demands.hopeless([each.measurement for each in trials])),
             f"nearest: {nearest.profile.name}: {'; '.join(nearest.failures)}",
             f"cheapest: {_figures(trials[0])}; most accurate: {_figures(finest)}",
         ]

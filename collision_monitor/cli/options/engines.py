@@ -22,7 +22,7 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--engine", choices=("processes", RAY), default="processes",
-        help="run in processes on this machine (default), or on Ray (needs `pip install collision_monitor[ray]`)",
+        help="run in processes on this machine (default), or on Ray (needs `pip install '.[ray]'`)",
     )  # fmt: skip
     parser.add_argument(
         "--address", metavar="HOST:PORT",

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from rich.console import Group, RenderableType
+from rich.constrain import Constrain
 from rich.table import Table
 from rich.text import Text
 
@@ -15,6 +16,8 @@ from collision_monitor.records import Phase, PredictionStatus
 
 CONTACT_ROWS = 5
 PREDICTION_ROWS = 10
+WIDEST = 100
+"""Columns of a terminal that the tables fill at most."""
 """The tables have a fixed number of rows, so that the picture does not jump."""
 
 _RECORDING = {0: "not recording", 1: "recording", 2: "RECORDING FAILED"}
@@ -31,13 +34,14 @@ class LatestAnswers:
     status: codec.MonitorStatus
 
     def table(self) -> RenderableType:
-        """Return the tables for a terminal."""
-        return Group(
+        """Return the tables for a terminal of 80 columns and more."""
+        group = Group(
             Text(f"{self.title}  {self.elapsed:4.1f} s", style="bold"),
             self._contact_table(),
             self._prediction_table(),
             Text(self._state()),
         )
+        return Constrain(group, WIDEST)
 
     def line(self) -> str:
         """Return the totals and the soonest predicted collision in one line."""
@@ -48,7 +52,7 @@ class LatestAnswers:
         return f"{line}  ({self._state()})"
 
     def _contact_table(self) -> Table:
-        table = _table("Touching now", ("objects", 36), ("depth", 12), ("for", 10), ("closing at", 12))
+        table = _table("Touching now", ("depth", 11), ("for", 9), ("closing at", 10))
         rows = 0
         if self.contacts is not None:
             names, contacts = _names(self.contacts), self.contacts.contacts
@@ -66,7 +70,7 @@ class LatestAnswers:
         return _padded(table, CONTACT_ROWS - rows)
 
     def _prediction_table(self) -> Table:
-        table = _table("Next", ("objects", 36), ("in", 12), ("at the latest", 14), ("status", 12), ("closing at", 12))
+        table = _table("Next", ("in", 7), ("at the latest", 13), ("status", 10), ("closing at", 10))
         rows = 0
         if self.predictions is not None:
             names, impacts = _names(self.predictions), self.predictions.predictions
@@ -77,7 +81,7 @@ class LatestAnswers:
                     _pair(impact, names),
                     _time(impact["lower"]),
                     _time(impact["upper"]),
-                    status + (", stale" if impact["stale"] else ""),
+                    "stale" if impact["stale"] else status,
                     f"{impact['closing_speed']:.2f} m/s",
                     style="yellow" if impact["lower"] < 1.0 else "",
                 )
@@ -98,9 +102,10 @@ class LatestAnswers:
 
 
 def _table(title: str, *columns: tuple[str, int]) -> Table:
-    table = Table(title=title, title_justify="left", expand=False)
-    for i, (name, width) in enumerate(columns):
-        table.add_column(name, width=width, justify="left" if i == 0 else "right", no_wrap=True)
+    table = Table(title=title, title_justify="left", expand=True)
+    table.add_column("objects", ratio=1, no_wrap=True)
+    for name, width in columns:
+        table.add_column(name, width=width, justify="right", no_wrap=True)
     return table
 
 

@@ -107,6 +107,11 @@ class Roster(Stage):
         """The ids of all described objects, ascending."""
         return sorted(self._slots)
 
+    @property
+    def names(self) -> dict[int, str]:
+        """The names of all described objects by id, for reading."""
+        return self._names
+
     def __contains__(self, object_id: int) -> bool:
         """Whether the object is described."""
         return isinstance(object_id, Hashable) and object_id in self._slots

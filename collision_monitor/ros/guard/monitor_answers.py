@@ -14,10 +14,10 @@ from collision_monitor.alerts.name_patterns import may_name
 from collision_monitor.alerts.rules import ANY
 from collision_monitor.codec import AlertLevel, CollisionAlert, CollisionAlertArray, RuleCoverage
 from collision_monitor.monitor.state.timeline import NANOSECOND
+from collision_monitor.ros.durations import spoken
 from collision_monitor.ros.guard.guard_limits import GuardLimits
 from collision_monitor.ros.guard.guarded_objects import GuardedObjects, LastState
 from collision_monitor.ros.guard.speed_limit import Braking, NearPair
-from collision_monitor.ros.guard.velocity_commands import spoken
 
 HEARD: Final = 1.2
 """s for which a monitor counts as there after its last answer; it answers twice a second at least."""

@@ -9,6 +9,7 @@ from typing import Any, Final
 from geometry_msgs.msg import TwistStamped
 
 from collision_monitor.monitor.state.timeline import NANOSECOND
+from collision_monitor.ros.durations import spoken
 from collision_monitor.ros.guard.speed_limit import Twist2
 
 COMPONENTS: Final = tuple((part, axis) for part in ("linear", "angular") for axis in "xyz")
@@ -75,11 +76,3 @@ def _values(command: Any) -> Iterator[tuple[str, float]]:
     twist = twist_of(command)
     for part, axis in COMPONENTS:
         yield f"{part}.{axis}", getattr(getattr(twist, part), axis)
-
-
-def spoken(seconds: float) -> str:
-    """Return a duration for people: 1.2 s, 3 min, 5 h, 12 days."""
-    for size, unit in ((86400.0, "days"), (3600.0, "h"), (60.0, "min")):
-        if seconds >= 2.0 * size:
-            return f"{seconds / size:.0f} {unit}"
-    return f"{seconds:.1f} s"

@@ -15,6 +15,7 @@ from typing import Final
 from collision_monitor.alerts.rules_in_force import RuleInForce
 from collision_monitor.codec import MonitorStatus
 from collision_monitor.errors import Refusal
+from collision_monitor.ros.durations import spoken
 from collision_monitor.ros.health.line_report import DiagnosticLevel, LineReport
 from collision_monitor.session import Recording
 
@@ -154,7 +155,7 @@ def _inputs(facts: NodeFacts, history: LastReports) -> Report:
     status, findings = facts.status, _Findings()
     moving = status.objects - status.objects_static
     if facts.silence is not None and facts.silence >= facts.stale_after and moving:
-        findings.add(DiagnosticLevel.ERROR, f"silent: no newer states on {facts.topic} for {facts.silence:.1f} s")
+        findings.add(DiagnosticLevel.ERROR, f"silent: no newer states on {facts.topic} for {spoken(facts.silence)}")
     elif facts.stale:
         findings.add(DiagnosticLevel.ERROR, f"stale: no usable new state of object {facts.stale}")
     if status.objects_unseen:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Final
 
+import numpy as np
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
@@ -28,13 +29,32 @@ from collision_monitor.sources.robot.robot_template import is_of_robot
 LOOK_PERIOD: Final = 0.2
 """s between two looks at the graph: DDS discovers publishers one after the other."""
 
+QUIET: Final = 2.0
+"""s without a new topic after which the graph is known."""
+
+PATIENCE: Final = 3.0
+"""s to wait for two messages of a topic: those of less than 1 Hz may be missed, and are listed without a rate."""
+
+LONGEST: Final = 30.0
+"""s after which a survey ends, also of a graph that never becomes quiet."""
+
+MOST_MARKERS: Final = 20_000
+"""Markers of a topic whose poses are remembered to see which of them move."""
+
+MOVED: Final = 1e-3
+"""Difference of two coordinates (m) or quaternions of a marker that moves."""
+
 
 @dataclass
 class TopicFacts:
-    """A topic and what its messages held. frames: of the headers. installed: whether this environment has the type."""
+    """A topic and what its messages held. frames: of the headers. installed: whether this environment has the type.
+
+    since: when it was found (monotonic s). markers: their namespaces. moved: those of markers that moved meanwhile.
+    """
 
     topic: str
     type: str
+    since: float
     installed: bool = True
     messages: int = 0
     first: float = 0.0
@@ -42,6 +62,12 @@ class TopicFacts:
     frames: set[str] = field(default_factory=set)
     parents: dict[str, str] = field(default_factory=dict)
     markers: set[str] = field(default_factory=set)
+    moved: set[str] = field(default_factory=set)
+    _poses: dict[tuple[str, int], Any] = field(default_factory=dict)
+
+    def is_known(self, now: float) -> bool:
+        """Whether enough messages came to know its rate, or it was waited for long enough."""
+        return not self.installed or self.messages > 1 or now - self.since >= PATIENCE
 
     @property
     def rate(self) -> float:
@@ -58,22 +84,45 @@ class TopicFacts:
         elif isinstance(content, MarkerArrays):
             self.frames |= set(map(frame_name, content.frames))
             self.markers |= set(content.namespaces)
+            self._note_moves(content)
         elif hasattr(content, "header"):
             self.frames.add(frame_name(content.header.frame_id))
 
+    def _note_moves(self, content: MarkerArrays) -> None:
+        for namespace, rows in content.last.items():
+            for number, row in rows.items():
+                pose, key = content.poses[row], (namespace, number)
+                before = self._poses.get(key)
+                if before is not None and (np.abs(pose - before) > MOVED).any():
+                    self.moved.add(namespace)
+                if before is not None or len(self._poses) < MOST_MARKERS:
+                    self._poses[key] = pose
 
-def survey(seconds: float) -> list[TopicFacts]:
+
+def survey(seconds: float | None = None) -> list[TopicFacts]:
     """Listen to every topic of a type that the sources understand, and return what was there, by topic.
 
+    seconds: for how long; None: until no new topic has come for QUIET and each was heard, LONGEST at most.
     The markers of monitors are left out: they show what is monitored already.
     """
     found: dict[str, TopicFacts] = {}
     decoder = Decoder({})
-    end = time.monotonic() + seconds
+    began = changed = time.monotonic()
+    known: list[tuple[str, list[str]]] = []
+
+    def is_over() -> bool:
+        now = time.monotonic()
+        if seconds is not None:
+            return now - began >= seconds
+        is_quiet = now - changed >= QUIET and all(each.is_known(now) for each in found.values())
+        return is_quiet or now - began >= LONGEST
+
     with _Listener("collision_monitor_survey") as listener:
-        while time.monotonic() < end:
+        while not is_over():
             listener.listen(LOOK_PERIOD)
-            topics = dict(listener.node.get_topic_names_and_types())
+            names = listener.node.get_topic_names_and_types()
+            changed, known = (changed, known) if names == known else (time.monotonic(), names)
+            topics = dict(names)
             for topic, kinds in topics.items():
                 if _is_of_a_monitor(topic, topics):
                     continue
@@ -94,7 +143,7 @@ def _subscribe(node: Node, topic: str, kind: str, found: dict[str, TopicFacts], 
     infos = node.get_publishers_info_by_topic(topic)
     if not infos:
         return
-    facts = found[topic] = TopicFacts(topic, kind)
+    facts = found[topic] = TopicFacts(topic, kind, time.monotonic())
     try:
         message = message_class(kind)
         decoder.define(kind, definition(kind))

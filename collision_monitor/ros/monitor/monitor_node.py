@@ -11,7 +11,7 @@ from pathlib import Path
 from rclpy.node import Node
 
 from collision_monitor import warm_up
-from collision_monitor._jit.compilation import compiling_nothing, on_first_compilation
+from collision_monitor._jit.compilation import FUNCTIONS, compiling_nothing, telling_compilation
 from collision_monitor.alerts.rules import Rules
 from collision_monitor.errors import CollisionMonitorError
 from collision_monitor.pipeline.topics import NODE
@@ -59,9 +59,8 @@ class MonitorNode(Managed, Node):
 
         Those that the settings do not need now are loaded too, for a later change, unless they were never compiled.
         """
-        log = self.get_logger().info
-        text = "compiling the kernels, once for this machine and version: this takes a minute or two"
-        with stop.ending(), on_first_compilation(lambda: log(text)):
+        total = FUNCTIONS["monitor"] + (FUNCTIONS["options"] if self._profile.uncertainty else 0)
+        with stop.ending(), telling_compilation(self.get_logger().info, total, every=10.0):
             warm_up.warm_up_monitor(self._profile)
             if self._rules.rules:
                 warm_up.warm_up_alerts()

@@ -28,7 +28,7 @@ MESH: Final = int(ShapeType.MESH)
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Mesh(Shape):
-    """Triangle surface, convex or not: vertices (n, 3) in m, faces (m, 3) of vertex indices.
+    """Triangle surface, convex or not: vertices (n, 3) in m, faces (m, 3) of vertex indices, or a trimesh object alone.
 
     Faces are counter-clockwise seen from outside. Vertices with equal coordinates are one point. Where the surface is
     not closed, the bounds of answers include what its unknown inside may change (see `surface`).
@@ -38,9 +38,11 @@ class Mesh(Shape):
     """
 
     vertices: Any
-    faces: Any
+    faces: Any = None
 
     def __post_init__(self) -> None:
+        if self.faces is None and hasattr(self.vertices, "faces"):
+            self.__dict__.update(vertices=self.vertices.vertices, faces=self.vertices.faces)
         vertices = point_rows(self.vertices, "Mesh vertices", 3, 3)
         try:
             if hides_some(self.faces):

@@ -97,6 +97,18 @@ def test_the_cost_of_probabilities_is_that_of_the_cheapest_profile_with_good_one
     assert explain(off, trials, demands)[2] == "dearer: probabilities (right), 3 times the time; no demand needs them"
 
 
+def test_it_is_said_which_demand_no_setting_meets_and_why(tuned) -> None:
+    """A finer setting does not help against the noise of the states, which nothing said."""
+    bad = [replace(each, failures=["bad"]) for each in tuned.trials]
+    least = min(each.measurement.ttc_error_s.p99 for each in bad)
+    hopeless = explain(None, bad, Demands(ttc_error=0.5 * least, distance_error=1e9))
+    assert [line.partition(":")[0] for line in hopeless][1:-2] == ["no setting helps"]
+    expected = f"no setting helps: TTC error of {0.5 * least:g} s: the least was {least:.3g} s; the states"
+    assert hopeless[1].startswith(expected)
+    possible = explain(None, bad, Demands(ttc_error=2.0 * least))
+    assert not any(line.startswith("no setting helps") for line in possible)
+
+
 def test_a_long_search_gets_shorter_runs(work: Workload, monkeypatch: pytest.MonkeyPatch) -> None:
     space = space_of(work, Profile(), Demands(ttc_error=0.01))
     plan = search_time.plan_search(work, space, 1)

@@ -55,6 +55,15 @@ def test_the_table_shows_each_pair_once_soonest_first():
     assert "recording, 17 messages" in text
 
 
+def test_the_table_fits_80_columns_and_cuts_nothing_but_long_names():
+    console = Console(width=80, record=True, file=open("/dev/null", "w"))  # noqa: SIM115
+    console.print(picture(recording=1).table())
+    text = console.export_text()
+    assert max(map(len, text.splitlines())) <= 80
+    for whole in ("robot_1 – rack_7", "rack_7 – person_3", "at the latest", "unresolved", "not known", "closing at"):
+        assert whole in text
+
+
 def test_what_is_stale_or_not_recorded_is_said():
     text = drawn(picture(objects_stale=2, recording=2))
     assert "2 STALE" in text

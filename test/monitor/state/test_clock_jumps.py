@@ -48,7 +48,8 @@ class Publisher:
             self.clock += PERIOD
         said = (self.clock if stamp is None else stamp, self.distance if distance is None else distance)
         self.sent = [*self.sent[-3:], said]
-        return monitor.step(said[0], list(self.ids), poses(100.0 * self.ids[0], said[1]))
+        rest = np.zeros((2, 6))  # a jump of the distance is no motion
+        return monitor.step(said[0], list(self.ids), poses(100.0 * self.ids[0], said[1]), rest)
 
 
 def poses(x: float, distance: float) -> NDArray[np.float64]:

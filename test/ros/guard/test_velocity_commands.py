@@ -10,10 +10,10 @@ pytest.importorskip("geometry_msgs.msg")
 from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Twist, TwistStamped
 
+from collision_monitor.ros.durations import spoken
 from collision_monitor.ros.guard.velocity_commands import (
     COMPONENTS,
     scaled_command,
-    spoken,
     stopped,
     twist_of,
     why_refused,
