@@ -67,7 +67,7 @@ def base_row(position: Any, quaternion: Any = (0, 0, 0, 1), linear: Any = (0, 0,
 def check(played: Played, robot: Robot, joints: Any, base: Any, atol: float = 1e-12) -> None:
     """Compare all states with the kinematics of the robot."""
     assert played.states
-    poses, twists = robot.motions(np.array(joints, np.float64), base)
+    poses, twists = robot.states(np.array(joints, np.float64), base)
     for name, state in played.states.items():
         row = robot.tree.links.index(name.removeprefix("arm/"))
         for field, expected in (

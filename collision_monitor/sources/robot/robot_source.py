@@ -13,7 +13,7 @@ from collision_monitor.errors import InputError, PoseError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
 from collision_monitor.robots import link_motions
-from collision_monitor.robots.robot import Description, Robot, make_robot, takes_long
+from collision_monitor.robots.robot import Description, Robot, takes_long
 from collision_monitor.robots.srdf import Pair
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.sources.ground.frames import FrameMotion
@@ -136,7 +136,7 @@ class RobotSource(Source):
         values, known, speed_known = self._joints.at(now_ns)
         if base is None:
             return
-        poses, twists = self.robot.motions(values, base.row)
+        poses, twists = self.robot.states(values, base.row)
         if self._finds_standing(base, poses):
             self._describe(scene)
         due = (self._needs & fresh).any(axis=1) | base_is_fresh
@@ -188,7 +188,7 @@ class RobotSource(Source):
         self._joints.fresh, self._base.fresh = fresh, base_is_fresh
         if base is None or not known[self.robot.tree.needs[row]].all():
             return None
-        poses, twists = self.robot.motions(values, base.row)
+        poses, twists = self.robot.states(values, base.row)
         return FrameMotion(poses[row, :3], poses[row, 3:], twists[row, :3], twists[row, 3:], moving=True)
 
     # -- descriptions
@@ -252,7 +252,7 @@ class RobotSource(Source):
                 scene.lacks(self.name, f"{self.name}/{link}", "; ".join(texts))
 
     def _make(self, urdf: Description) -> Robot:
-        return self._accept(make_robot(urdf, self._srdf, self._entry.packages))
+        return self._accept(Robot(urdf, self._srdf, self._entry.packages))
 
     def _accept(self, robot: Robot) -> Robot:
         """Take over a robot. Raises InputError if the file says more about it than it has."""
@@ -284,7 +284,7 @@ class RobotSource(Source):
         self._standing = {}
         if isinstance(self._base, FixedBase):  # its links stand from the start
             base = self._base.motion(0, robot, scene)
-            self._finds_standing(base, robot.motions(self._joints.at(0)[0], base.row)[0])
+            self._finds_standing(base, robot.states(self._joints.at(0)[0], base.row)[0])
             self._base.fresh = True
         self._describe(scene)
 
