@@ -45,7 +45,7 @@ def _follow(monitor: Monitor, given: ObjectTrajectory, stamp_ns: int) -> None:
         )
     twists = given.twists if len(given.twists) else None
     plan = Trajectory(
-        given.times, given.poses, twists, between=_BETWEEN[given.between], then=_THEN[given.then]
+        given.times, given.poses, twists, between=_BETWEEN[given.between], then=_THEN[given.then], tube=given.tube
     )  # fmt: skip
     tolerance = Tolerance(*given.tolerance.tolist()) if given.tolerance.any() else Tolerance()
     monitor.follow(given.object_id, plan, stamp_ns=stamp_ns, tolerance=tolerance)

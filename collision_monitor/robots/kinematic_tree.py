@@ -46,7 +46,7 @@ class KinematicTree:
     """links: names, by row of the table. joints: names of the variables, by column.
 
     wraps (J,): whether the position of a joint may jump by a turn, as that of a continuous one. needs (L, J): whether
-    the pose of a link in the base link depends on a joint. turns (L, J): by how many rad the link turns at most for each
+    the pose of a link in the base link depends on a joint. turns (L, J): rad by which the link turns at most for each
     rad or m of a joint. limits (J, 2): smallest and largest position (rad or m).
     """
 

@@ -199,9 +199,7 @@ class PlanningSceneSource(Source):
         scene.has(self.name, f"{self.name}/{name}")
         self._is_changed = True
 
-    def _change_held(
-        self, message: Any, name: str, stamp_ns: int, scene: SourceScene, *, leaves_world: bool
-    ) -> None:
+    def _change_held(self, message: Any, name: str, stamp_ns: int, scene: SourceScene, *, leaves_world: bool) -> None:
         """Attach or detach an object. leaves_world: whether the world keeps an object of that name, if it has one.
 
         Source: MoveIt, planning_scene.cpp, processAttachedCollisionObjectMsg. Raises InputError, ShapeError, PoseError.
@@ -273,9 +271,7 @@ class PlanningSceneSource(Source):
             except CollisionMonitorError:
                 scene.remove(held.object_id)
                 raise
-            self._world[name] = WorldObject(
-                held.object_id, CollisionObject(name, held.content.shapes, scene.frame, at)
-            )
+            self._world[name] = WorldObject(held.object_id, CollisionObject(name, held.content.shapes, scene.frame, at))
             return
         self._lack(name, scene)
 

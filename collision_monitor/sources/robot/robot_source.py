@@ -27,6 +27,7 @@ from collision_monitor.sources.robot.joint_table import JointTable
 from collision_monitor.sources.robot.link_rules import LinkRules, allowed_contacts
 from collision_monitor.sources.robot.robot_base import BaseMotion, FixedBase, FrameBase, at_links, robot_base
 from collision_monitor.sources.robot.robot_entry import RobotEntry
+from collision_monitor.sources.robot.robot_plans import RobotPlans
 
 Floats = NDArray[np.float64]
 
@@ -73,6 +74,7 @@ class RobotSource(Source):
         self._standing: dict[int, Pose] = {}  # poses of the links that are rigid with it
         self._moving = CarriedBodies((), ())
         self._needs = np.zeros((0, 0), np.bool_)
+        self._plans: RobotPlans | None = None
         self._unknown_joints: set[str] = set()
         topics = {entry.joint_states: (JOINT_STATE,), entry.urdf_topic: (TEXT,), entry.srdf_topic: (TEXT,)}
         self.topics: Table[str, tuple[str, ...]] = {
@@ -122,6 +124,8 @@ class RobotSource(Source):
         self._base.restart()
         if self.robot is not None:
             self._joints.restart()
+        if self._plans is not None:
+            self._plans.restart()
 
     def settle(self, now_ns: int, scene: SourceScene) -> None:
         """See Source. Observes the bodies about which there is news."""
@@ -154,6 +158,7 @@ class RobotSource(Source):
             scene.has(self.name, f"{self.name}: joints")
         if len(chosen):
             self._observe(chosen, base, poses, twists, speed_known, now_ns, scene)
+            self._plan(base, values, known & speed_known, now_ns, scene)
 
     # -- for a planning scene
 
@@ -313,6 +318,8 @@ class RobotSource(Source):
         moving = [it for it in bodies if it.object_id in self._described and it.object_id not in self._standing]
         self._moving = CarriedBodies(moving, self.robot.tree.links)
         self._needs = self.robot.tree.needs[self._moving.rows]
+        padding = self._entry.padding + max(rules.padding.values(), default=0.0)
+        self._plans = RobotPlans(self.robot.tree, moving, padding, rules.scale, self._plans)
 
     def _digest(self, body: Body) -> bytes:
         """Return what is equal for equal shapes, computed once for each."""
@@ -374,7 +381,18 @@ class RobotSource(Source):
                 states[field_name] = column
         unknown = (self._needs[chosen] & ~speed_known).any(axis=1) | (not base.motion.twist_known)
         states["flags"][unknown] |= np.uint32(StateFlag.TWIST_UNKNOWN)
-        scene.observe(self.name, states, now_ns)
+        scene.observe(self.name, states, now_ns, turns=True)
+
+    def _plan(
+        self, base: BaseMotion, values: Floats, known: NDArray[np.bool_], now_ns: int, scene: SourceScene
+    ) -> None:  # fmt: skip
+        """Let the bodies follow the joints at their rates. The errors of a base that has some count on arcs only."""
+        assert self._plans is not None
+        usable = ~(self._needs & ~known).any(axis=1)
+        if base.stddev.any() or not base.motion.twist_known:
+            usable[:] = False
+        with scene.guard(self.name, "plans"):
+            scene.follow(self._plans.due(now_ns, values, base.row, usable, scene.horizon), now_ns)
 
     def _refuse_unknown(self, names: Any, scene: SourceScene) -> None:
         """Count each joint once that no robot of the file has."""
