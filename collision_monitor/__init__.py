@@ -4,6 +4,7 @@
     settings.profile               Profile                                the settings that trade speed for accuracy
     shapes.kinds, shapes.pose      Sphere, Box, …, Pose, Motion           shapes of objects, and their poses
     shapes.mesh_file               load_mesh                              a mesh from a file
+    robots.robot                   Robot                                  a URDF: its links along their joints
     objects.description            ObjectDescription                      an object with its shapes, group and bounds
     objects.convex_decomposition   convex_decomposition, Decomposition    a concave mesh as convex parts, with an error
     query.contact.contact          contact, Contact                       two shapes: distance, normal, points, bound
@@ -45,6 +46,7 @@ _HOME = {
     "Motion": "motion.stated_motion",
     "Trajectory": "motion.trajectory",
     "Tolerance": "motion.trajectory",
+    "Robot": "robots.robot",
     "load_mesh": "shapes.mesh_file",
     "contact": "query.contact.contact",
     "Contact": "query.contact.contact",
@@ -141,6 +143,7 @@ if TYPE_CHECKING:
     from collision_monitor.query.points.rays import RayHits as RayHits
     from collision_monitor.query.points.rays import cast_ray as cast_ray
     from collision_monitor.records import Model as Model
+    from collision_monitor.robots.robot import Robot as Robot
     from collision_monitor.settings.profile import Profile as Profile
     from collision_monitor.shapes.mesh_file import load_mesh as load_mesh
     from collision_monitor.shapes.pose import Pose as Pose

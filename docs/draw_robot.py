@@ -16,7 +16,7 @@ import matplotlib.pyplot as plt
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from collision_monitor import Cylinder, Monitor, Pose
-from collision_monitor.robots.robot import Description, Robot, make_robot
+from collision_monitor.robots.robot import Description, Robot
 from collision_monitor.shapes.registry import Shape, kind_of
 
 ROOT = Path(__file__).parents[1]
@@ -37,7 +37,7 @@ def predicted(robot: Robot, joints: Any) -> tuple[set[str], str]:
     """Return the link that hits the post first, and when, as the monitor predicts it."""
     monitor = Monitor()
     monitor.add(0, POST[1], static=True, pose=POST[0])
-    poses, twists = robot.motions(joints, np.eye(1, 13, 6)[0])
+    poses, twists = robot.states(joints, np.eye(1, 13, 6)[0])
     allowed = list(range(1, len(robot.links) + 1))
     for k, shapes in enumerate(robot.shapes, start=1):
         monitor.add(k, shapes, allowed=allowed)
@@ -51,7 +51,7 @@ def predicted(robot: Robot, joints: Any) -> tuple[set[str], str]:
 
 def main() -> None:
     """Write docs/images/arm.png."""
-    robot = make_robot(Description.read(ROOT / "examples/arm/arm.urdf"))
+    robot = Robot(Description.read(ROOT / "examples/arm/arm.urdf"))
     figure = plt.figure(figsize=(9.4, 3.4), dpi=120)
     for k, angle in enumerate(SWING):
         joints = np.zeros((8, 2))
@@ -59,7 +59,7 @@ def main() -> None:
         joints[0, 1] = SPEED
         hit, text = predicted(robot, joints)
         axes = figure.add_subplot(1, 3, k + 1, projection="3d", computed_zorder=True)
-        poses, _ = robot.motions(joints, np.eye(1, 13, 6)[0])
+        poses, _ = robot.states(joints, np.eye(1, 13, 6)[0])
         for link, row, shapes in zip(robot.links, robot.rows, robot.shapes, strict=True):
             for shape, at in shapes:
                 draw(axes, shape, Pose(poses[row, :3], poses[row, 3:]) @ at, HIT if link in hit else PLAIN)

@@ -11,7 +11,7 @@ import numpy as np
 
 from collision_monitor.codec.cdr import Buffer, Floats, Reader, Writer, write_header
 
-LEAST: Final = 50
+LEAST: Final = 58
 """Bytes of the shortest trajectory."""
 
 
@@ -44,6 +44,7 @@ class ObjectTrajectory:
     object_id: int
     between: int = Between.STRAIGHT
     then: int = Then.REST
+    tube: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,10 +71,9 @@ def _read(reader: Reader) -> ObjectTrajectory:
     poses, twists = (
         reader.sequence(np.dtype(("<f8", (width,))), 8, name) for name, width in (("poses", 7), ("twists", 6))
     )
-    tolerance, object_id = reader.floats(4, "across"), reader.scalar("u4", "id")
-    return ObjectTrajectory(
-        times, poses, twists, tolerance, object_id, reader.scalar("u1", "between"), reader.scalar("u1", "then")
-    )
+    tolerance, tube = reader.floats(4, "across"), reader.scalar("f8", "tube")
+    object_id, between, then = reader.scalar("u4", "id"), reader.scalar("u1", "between"), reader.scalar("u1", "then")
+    return ObjectTrajectory(times, poses, twists, tolerance, object_id, between, then, tube)
 
 
 def encode_trajectories(stamp_ns: int, frame_id: str, trajectories: Sequence[ObjectTrajectory]) -> bytes:
@@ -88,6 +88,7 @@ def encode_trajectories(stamp_ns: int, frame_id: str, trajectories: Sequence[Obj
             if numbers.size:
                 writer.raw(numbers.tobytes(), 8)
         writer.raw(np.ascontiguousarray(each.tolerance, "<f8").tobytes(), 8)
+        writer.scalar("f8", each.tube, "tube")
         writer.scalar("u4", each.object_id, "id")
         writer.scalar("u1", each.between, "between")
         writer.scalar("u1", each.then, "then")

@@ -358,9 +358,9 @@ def judge_plans(bodies: Any, rows: Any, now: float, verdicts: Any) -> None:
 
 @inlined
 def _deviation(bodies: Any, row: Any) -> float:
-    """How far (m) the surface of a body was from its plan at its last state."""
+    """How far (m) the surface of a body was from the pieces of its plan at its last state."""
     r = bodies.spin_radius[row.slot]
-    off: float = row.apart + row.tube + (r * row.turned if 0.0 < r < inf else 0.0)
+    off: float = row.apart + (r * row.turned if 0.0 < r < inf else 0.0)
     return off
 
 
@@ -404,9 +404,10 @@ def renew_plans(
         drift = settings.stale_acceleration * age
         apart, kept = off + 0.5 * drift * age, 1.0 if age > 0.0 else 1.0 - FORGOTTEN
         row.lately, row.drifted = max(apart, kept * row.lately), max(drift, kept * row.drifted)
-        width = _uncertain_width(bodies, uncertainty, i, age, settings.stale_acceleration)
-        is_off = not (apart <= m.tube_0 and drift <= m.tube_1 and width <= m.spread_0)
-        is_wide = m.tube_0 > TOO_WIDE * max(needed[0], row.lately) or m.tube_1 > TOO_WIDE * max(needed[1], row.drifted)
+        width = m.tube_0 - row.tube  # what is left for the body
+        spread = _uncertain_width(bodies, uncertainty, i, age, settings.stale_acceleration)
+        is_off = not (apart <= width and drift <= m.tube_1 and spread <= m.spread_0)
+        is_wide = width > TOO_WIDE * max(needed[0], row.lately) or m.tube_1 > TOO_WIDE * max(needed[1], row.drifted)
         if row.fresh or is_off or is_wide:
             if bodies.slack[i] > 0.0:  # 0: the body is new
                 bodies.slack[i] = max(0.5 * bodies.slack[i], SHORTEST_SLACK * horizon)
@@ -414,9 +415,9 @@ def renew_plans(
             row.fresh = False
             bodies.version[i] += np.uint32(1)
             m.tube_time, m.anew, m.covered = now, now, -inf
-            m.tube_0 = max(needed[0], ROOM * row.lately, off + 2.0 * drift * age)
+            m.tube_0 = row.tube + max(needed[0], ROOM * row.lately, off + 2.0 * drift * age)
             m.tube_1 = needed[1] + 2.0 * row.drifted
-            m.spread_0, m.spread_1 = WIDER * width, 0.0
+            m.spread_0, m.spread_1 = WIDER * spread, 0.0
             set_cover(bodies, i, now, horizon)
             put_box(grid, i, swept_box(bodies, i, now, settings.margin))
             found[0, n] = i

@@ -15,6 +15,7 @@ from typing import Any, Final, NamedTuple
 from collision_monitor._jit import device, inlined, outlined
 from collision_monitor.geometry.vector import Vector, cross, dot
 from collision_monitor.motion.trigonometry import sin_cos
+from collision_monitor.tolerances import EPSILON
 
 STRAIGHT: Final = 0
 STOPPING: Final = 1
@@ -34,6 +35,9 @@ ALIGNED: Final = 1e-9
 
 SLOWEST: Final = 1e-9
 """rad/s. Slower, a body bends by nothing that counts: 1e-9 of its way in a second."""
+
+SMALL_ANGLE: Final = 1e-4
+"""rad, below which the series of the logarithm of a screw is exact to round-off."""
 
 SERIES: Final = 0.5
 """rad. Up to it, the shift of an arc is computed from a series, because its closed form cancels."""
@@ -86,6 +90,35 @@ def course_of(v: Vector, w: Vector, a: Vector, turns: bool, stops: bool) -> Cour
     if is_arc:
         return Course(ARC, aligned, rest)
     return Course(STOPPING, aligned, rest) if rest < inf else Course(STRAIGHT, a, inf)
+
+
+@inlined
+def screw_velocity(moved: Vector, turn: Vector) -> Vector:
+    """Velocity at first of the constant twist with which a body moves by `moved` in 1 s and turns by the vector `turn`.
+
+    World axes. (Murray, Li and Sastry, 1994, 2.3: logarithm of a rigid motion)
+    """
+    angle = sqrt(dot(turn, turn))
+    tail = 1.0 / 12.0
+    if angle >= SMALL_ANGLE:
+        half = 0.5 * angle
+        sine, cosine = sin_cos(half)
+        tail = (1.0 - half * cosine / sine) / (angle * angle)
+    across = cross(turn, moved)
+    inward = cross(turn, across)
+    return (
+        moved[0] - 0.5 * across[0] + tail * inward[0],
+        moved[1] - 0.5 * across[1] + tail * inward[1],
+        moved[2] - 0.5 * across[2] + tail * inward[2],
+    )
+
+
+@inlined
+def bends(v: Vector, w: Vector) -> bool:
+    """Whether a body with a constant twist in its own frame leaves a line by more than round-off."""
+    across = cross(w, v)
+    least = 4.0 * EPSILON
+    return dot(across, across) > least * least * dot(w, w) * dot(v, v)
 
 
 @inlined

@@ -231,13 +231,14 @@ def most_turning(m: Any, begin: float, end: float) -> float:
 def half_acceleration(A: Any, B: Any, begin: float, end: float) -> float:
     """Bound on half the acceleration of motion B relative to motion A between two times (m/s^2)."""
     if not are_straight(A, B):
-        return 0.5 * (_most_acceleration(A, begin, end) + _most_acceleration(B, begin, end))
+        return 0.5 * (acceleration_within(A, begin, end) + acceleration_within(B, begin, end))
     x, y, z = B.ax - A.ax, B.ay - A.ay, B.az - A.az
     return 0.5 * sqrt(x * x + y * y + z * z)
 
 
 @outlined
-def _most_acceleration(m: Any, begin: float, end: float) -> float:
+def acceleration_within(m: Any, begin: float, end: float) -> float:
+    """Bound on the acceleration (m/s^2) of the origin of the motion m (MOTION) between two times (s)."""
     v, w, a = (m.vx, m.vy, m.vz), (m.wx, m.wy, m.wz), (m.ax, m.ay, m.az)
     return most_acceleration(m.course, v, w, a, begin - m.time, end - m.time, m.rest - m.time)
 
@@ -359,7 +360,7 @@ def _swept_by_pieces(m: Any, begin: float, sweep: float, half: float) -> Region:
     for piece in range(1, pieces + 1):
         begins, ends = begin + sweep * (piece - 1) / pieces, begin + sweep * piece / pieces
         span = ends - begins
-        bent = 0.125 * _most_acceleration(m, begins, ends) * span * span
+        bent = 0.125 * acceleration_within(m, begins, ends) * span * span
         after = position_at(m, ends)
         least = (
             min(least[0], min(before[0], after[0]) - bent),

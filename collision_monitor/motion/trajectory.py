@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from collision_monitor._jit import allocating_kernel, outlined
 from collision_monitor.checks.numbers import as_numbers, checked_number
 from collision_monitor.errors import PoseError
-from collision_monitor.motion.course import ARC, STRAIGHT, turned_for
+from collision_monitor.motion.course import ARC, STRAIGHT, bends, screw_velocity, turned_for
 from collision_monitor.motion.motion import turn_quaternion, twist_on
 from collision_monitor.motion.stated_motion import (
     ACCELERATION,
@@ -60,9 +60,6 @@ ROUND_OFF_ANGLE: Final = 64.0 * EPSILON
 """rad, up to which two orientations are one: quaternions of one orientation, computed in two ways, differ by as much.
 Larger: a body jumps between two points. Smaller: a HalfSpace, which cannot turn, is refused for round-off."""
 
-SMALL_ANGLE: Final = 1e-4
-"""rad, below which the series of the logarithm of a rotation is exact to round-off."""
-
 
 class Tolerance(NamedTuple):
     """How far a body may be off its plan and still follows it. All are at least 0.
@@ -91,6 +88,7 @@ class Trajectory(Frozen):
     body's own frame, as a wheeled robot follows a path (Murray, Li and Sastry, 1994, 2.3); "curve", the cubic Hermite
     spline, with a constant angular velocity between two points. The default is "curve" with twists, "straight" without.
     A curve is known to 1e-6 m, so an impact with what it touches or slides along is unresolved.
+    tube: how far the body's points may be off what lies between two points (m).
     then: what holds after the last point: "rest"; "go on" along the last piece; "unknown": no answer is clear beyond.
 
     >>> path = Trajectory([0, 1, 3], [(0, 0, 0), (1, 0, 0), (1, 4, 0)])
@@ -104,6 +102,7 @@ class Trajectory(Frozen):
     """(N, 3): linear velocities at the points, as far as they were given."""
     between: Between
     then: Then
+    tube: float
     begins: Array
     """(M,): s at which each piece begins."""
     numbers: Array
@@ -112,7 +111,14 @@ class Trajectory(Frozen):
     """(M,): m by which the body may be off each piece."""
 
     def __init__(
-        self, times: Any, poses: Any, twists: Any = None, *, between: Between | None = None, then: Then = "rest"
+        self,
+        times: Any,
+        poses: Any,
+        twists: Any = None,
+        *,
+        between: Between | None = None,
+        then: Then = "rest",
+        tube: float = 0.0,
     ) -> None:
         known = self.__dict__
         if between is None:
@@ -125,6 +131,7 @@ class Trajectory(Frozen):
         if between == "curve" and velocities is None:
             raise PoseError("twists: expected linear velocities at the points of a curve, got none")
         known["between"], known["then"] = between, then
+        known["tube"] = tube = checked_number(tube, "tube", "m", least=0.0, error=PoseError)
         spans = np.diff(times)
         turns = _rotation_vectors(poses[:-1, 3:], poses[1:, 3:])
         rows = _still_rows(poses[:-1])
@@ -136,9 +143,7 @@ class Trajectory(Frozen):
         if between == "curve" and velocities is not None:
             rows, begins, tubes = _curves(times, poses, velocities, rows)
         elif between == "arc":
-            shifts = _screws(np.diff(poses[:, :3], axis=0), turns)
-            rows[:, LINEAR:ANGULAR] = shifts / spans[:, None]
-            rows[_bend(shifts, turns), COURSE] = ARC
+            _bend_rows(rows, np.diff(poses[:, :3], axis=0), turns, spans)
         else:
             rows[:, LINEAR:ANGULAR] = secants
         first, last = _still_rows(poses[:1]), _still_rows(poses[-1:])
@@ -148,7 +153,7 @@ class Trajectory(Frozen):
                 last[:, LINEAR:ANGULAR], last[:, ACCELERATION:COURSE] = velocities[-1], 0.0
         known["numbers"] = np.concatenate([first, rows, last])
         known["begins"] = np.concatenate([[-LARGEST_INPUT], begins, times[-1:]])
-        known["tubes"] = np.concatenate([[0.0], tubes, [0.0]])
+        known["tubes"] = np.concatenate([[0.0], tubes + tube, [tube if then == "go on" else 0.0]])
         for each in known.values():
             if isinstance(each, np.ndarray):
                 each.setflags(write=False)
@@ -160,7 +165,7 @@ class Trajectory(Frozen):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles hold what it was made of."""
-        return _made_of, (self.times, self.poses, self.twists, self.between, self.then)
+        return _made_of, (self.times, self.poses, self.twists, self.between, self.then, self.tube)
 
     @property
     def pose(self) -> Pose:
@@ -194,8 +199,10 @@ class Trajectory(Frozen):
         return known
 
 
-def _made_of(times: Array, poses: Array, twists: Array | None, between: Between, then: Then) -> Trajectory:
-    return Trajectory(times, poses, twists, between=between, then=then)
+def _made_of(
+    times: Array, poses: Array, twists: Array | None, between: Between, then: Then, tube: float
+) -> Trajectory:  # fmt: skip
+    return Trajectory(times, poses, twists, between=between, then=then, tube=tube)
 
 
 def _flat(path: Trajectory) -> Trajectory:
@@ -210,7 +217,7 @@ def _flat(path: Trajectory) -> Trajectory:
         )
     if path.twists is not None:
         twists = path.twists * (1.0, 1.0, 0.0)
-    return _made_of(path.times, poses, twists, path.between, path.then)
+    return _made_of(path.times, poses, twists, path.between, path.then, path.tube)
 
 
 def _check_choice(value: Any, name: str, choices: tuple[str, ...]) -> None:
@@ -301,24 +308,16 @@ def _rotation_vectors(before: Array, after: Array) -> Array:
     return turn * factor[:, None]
 
 
-def _screws(moved: Array, turns: Array) -> Array:
-    """Velocities (N, 3) at first of the constant twists with which bodies move by `moved` (N, 3) in 1 s. World axes.
-
-    turns (N, 3): rotation vectors. (Murray, Li and Sastry, 1994, 2.3: logarithm of a rigid motion)
-    """
-    angle = np.linalg.norm(turns, axis=1)
-    is_small = angle < SMALL_ANGLE
-    safe = np.where(is_small, 1.0, angle)
-    half = 0.5 * safe
-    tail = np.where(is_small, 1.0 / 12.0, (1.0 - half * np.cos(half) / np.sin(half)) / (safe * safe))
-    across = np.cross(turns, moved)
-    return moved - 0.5 * across + tail[:, None] * np.cross(turns, across)
-
-
-def _bend(shifts: Array, turns: Array) -> NDArray[np.bool_]:
-    """Whether twists with these shifts and rotation vectors (N, 3) leave a line by more than round-off (N,)."""
-    across, turn, shift = (np.linalg.norm(each, axis=1) for each in (np.cross(turns, shifts), turns, shifts))
-    return np.asarray(across > 4.0 * EPSILON * turn * shift)
+@allocating_kernel
+def _bend_rows(rows: Any, moved: Any, turns: Any, spans: Any) -> None:
+    """Let motions (N, NUMBERS) be arcs on which bodies move by `moved` (N, 3) and turn by rotation vectors (N, 3)."""
+    for k in range(len(rows)):
+        turn = (turns[k, 0], turns[k, 1], turns[k, 2])
+        v = screw_velocity((moved[k, 0], moved[k, 1], moved[k, 2]), turn)
+        for c in range(3):
+            rows[k, LINEAR + c] = v[c] / spans[k]
+        if bends(v, turn):
+            rows[k, COURSE] = ARC
 
 
 def _curves(times: Array, poses: Array, velocities: Array, rows: Array) -> tuple[Array, Array, Array]:

@@ -52,5 +52,5 @@ def trajectory_of(given: ObjectTrajectory) -> Trajectory:
         )
     twists = given.twists if len(given.twists) else None
     return Trajectory(
-        given.times, given.poses, twists, between=_BETWEEN[given.between], then=_THEN[given.then]
+        given.times, given.poses, twists, between=_BETWEEN[given.between], then=_THEN[given.then], tube=given.tube
     )  # fmt: skip

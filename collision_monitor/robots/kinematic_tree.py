@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -46,7 +46,8 @@ class KinematicTree:
     """links: names, by row of the table. joints: names of the variables, by column.
 
     wraps (J,): whether the position of a joint may jump by a turn, as that of a continuous one. needs (L, J): whether
-    the pose of a link in the base link depends on a joint.
+    the pose of a link in the base link depends on a joint. turns (L, J): rad by which the link turns at most for each
+    rad or m of a joint. limits (J, 2): smallest and largest position (rad or m).
     """
 
     links: tuple[str, ...]
@@ -54,6 +55,8 @@ class KinematicTree:
     table: LinkTable
     wraps: NDArray[np.bool_]
     needs: NDArray[np.bool_]
+    turns: NDArray[np.float64]
+    limits: NDArray[np.float64]
 
 
 def kinematic_tree(urdf: Urdf) -> KinematicTree:
@@ -120,25 +123,43 @@ def _tree(order: list[str], by_child: dict[str, Joint], urdf: Urdf) -> Kinematic
         np.ones(count),
         np.zeros(count),
     )
-    needs = np.zeros((count, len(column)), np.bool_)
+    needs, turns = np.zeros((count, len(column)), np.bool_), np.zeros((count, len(column)))
     leaders: dict[str, tuple[str, float, float]] = {}
     for i, name in enumerate(order[1:], start=1):
         joint = by_child[name]
         table.parent[i], table.kind[i] = row[joint.parent], _KINDS[joint.type]
         table.position[i], table.quaternion[i] = joint.origin.position, joint.origin.quaternion
         table.axis[i] = joint.axis
-        needs[i] = needs[table.parent[i]]
+        needs[i], turns[i] = needs[table.parent[i]], turns[table.parent[i]]
         if table.kind[i] != FIXED:
             source, table.multiplier[i], table.offset[i] = _leader(joint, urdf, leaders)
             table.variable[i] = column[source]
             needs[i, column[source]] = True
+            turns[i, column[source]] += abs(table.multiplier[i]) if table.kind[i] == TURNING else 0.0
     wraps = np.array([joint.type is JointType.CONTINUOUS for joint in free], np.bool_)
-    return KinematicTree(tuple(order), tuple(column), table, wraps, needs)
+    limits = np.array([joint.limits for joint in free]).reshape(-1, 2)
+    return KinematicTree(tuple(order), tuple(column), table, wraps, needs, turns, limits)
 
 
-def _leader(
-    joint: Joint, urdf: Urdf, known: dict[str, tuple[str, float, float]]
-) -> tuple[str, float, float]:
+def with_fixed_rows(tree: KinematicTree, rows: NDArray[np.intp], poses: NDArray[np.float64]) -> KinematicTree:
+    """Return a tree with further frames (K), fixed to the links `rows` (K,) at poses (K, 7) in their frames."""
+    count, table = len(rows), tree.table
+    more = LinkTable(
+        rows.astype(np.int32),
+        np.full(count, FIXED, np.int32),
+        poses[:, :3],
+        poses[:, 3:],
+        np.zeros((count, 3)),
+        np.full(count, -1, np.int32),
+        np.ones(count),
+        np.zeros(count),
+    )
+    grown = LinkTable(*(np.concatenate([old, new]) for old, new in zip(table, more, strict=True)))
+    needs, turns = (np.concatenate([each, each[rows]]) for each in (tree.needs, tree.turns))
+    return replace(tree, links=(*tree.links, *[""] * count), table=grown, needs=needs, turns=turns)
+
+
+def _leader(joint: Joint, urdf: Urdf, known: dict[str, tuple[str, float, float]]) -> tuple[str, float, float]:
     """Return the joint that this one follows in the end, and multiplier and offset of its position.
 
     known: the same for the joints so far, so that a chain of mimics is walked once.

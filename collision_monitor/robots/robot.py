@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
+from os import PathLike
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import InputError
+from collision_monitor.motion.trajectory import Then, Trajectory
 from collision_monitor.robots.kinematic_tree import KinematicTree, kinematic_tree
 from collision_monitor.robots.link_motions import link_motions
+from collision_monitor.robots.link_pieces import Wanted
+from collision_monitor.robots.link_plans import TUBE, joint_values, planned_links, radius_of
 from collision_monitor.robots.link_shapes import Meshes, link_shapes
 from collision_monitor.robots.mesh_location import FileLocator
 from collision_monitor.robots.srdf import Pair, disabled_pairs
 from collision_monitor.robots.touching_links import touching_links
-from collision_monitor.robots.urdf import parse_urdf
+from collision_monitor.robots.urdf import Urdf, parse_urdf
 from collision_monitor.settings.regular_file import read_regular
 from collision_monitor.settings.xml_tree import LARGEST_TEXT
 from collision_monitor.shapes.pose import Pose
@@ -52,14 +57,20 @@ class Description:
         return cls(read_regular(path, most=LARGEST_TEXT), str(path), path.parent)
 
 
-@dataclass(frozen=True, eq=False)
-class Robot:
-    """Links with shapes, in the order of `rows`.
+_Source = Description | str | PathLike[str]
+"""A URDF or an SRDF: its text, or the path of its file."""
 
-    rows (S,): rows of these links in the tree. shapes: of each link, with their poses in its frame. touching, disabled:
-    pairs of links whose contact is expected, by construction and by the SRDF. known_joints: names of all joints, with
-    the fixed and mimic ones. left_out: name of the link, or nothing, and a text for each part of the files that is left
-    out.
+
+class Robot:
+    """A robot of a URDF, and of an SRDF if there is one: links with shapes, and how its joints move them.
+
+    urdf, srdf: paths of the files. packages: folders of ROS packages by name. A geometry that cannot be used is left
+    out, and `problems` names it. Raises InputError if nothing is left, and for files that are no URDF or SRDF.
+
+    tree: its joints. rows (S,): rows of the links with shapes in the tree. shapes: of each of these links, with their
+    poses in its frame. touching, disabled: pairs of links whose contact is expected, by construction and by the SRDF.
+    known_joints: names of all joints, with the fixed and mimic ones. left_out: name of the link, or nothing, and a text
+    for each part of the files that is left out.
     """
 
     tree: KinematicTree
@@ -69,6 +80,38 @@ class Robot:
     disabled: frozenset[Pair]
     known_joints: frozenset[str]
     left_out: tuple[tuple[str, str], ...]
+
+    def __init__(
+        self, urdf: _Source, srdf: _Source | None = None, packages: Mapping[str, Path] | None = None
+    ) -> None:  # fmt: skip
+        description = _description(urdf)
+        model = parse_urdf(description.text, description.name)
+        self.tree = kinematic_tree(model)
+        files = FileLocator(description.folder, packages)
+        left_out: list[tuple[str, str]] = []
+        meshes: Meshes = {}
+        shapes: dict[str, tuple[tuple[Shape, Pose], ...]] = {}
+        for name in self.tree.links:
+            found, texts = link_shapes(model.links[name], files, meshes)
+            left_out += [(name, text) for text in texts]
+            if found:
+                shapes[name] = tuple(found)
+        if not shapes:
+            reason = f": {left_out[0][1]}" if left_out else ", only <visual> or nothing"
+            raise InputError(
+                f"{description.name}: expected a link with a <collision> that can be used, got none{reason}"
+            )
+        self.rows = np.array([row for row, name in enumerate(self.tree.links) if name in shapes])
+        self.shapes = tuple(shapes.values())
+        self.touching = frozenset(touching_links(self.tree, shapes))
+        disabled, unknown = _disabled(srdf, self.tree.links, model, description.name)
+        self.disabled = frozenset(pair for pair in disabled if pair[0] in shapes and pair[1] in shapes)
+        self.known_joints = frozenset(model.joints)
+        self.left_out = (*left_out, *unknown)
+
+    def __repr__(self) -> str:
+        """Return how much of it there is."""
+        return f"{type(self).__name__}({len(self.rows)} links with shapes, {len(self.joints)} joints)"
 
     @property
     def problems(self) -> list[str]:
@@ -80,7 +123,12 @@ class Robot:
         """Names of the links with shapes, (S)."""
         return [self.tree.links[row] for row in self.rows]
 
-    def motions(self, joints: Floats, base: Floats) -> tuple[Floats, Floats]:
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints that move by themselves, (J): without fixed and mimic ones."""
+        return self.tree.joints
+
+    def states(self, joints: Floats, base: Floats) -> tuple[Floats, Floats]:
         """Return poses (L, 7) and twists (L, 6) of all links of the tree, in the frame of the base's pose.
 
         joints (J, 2): position and velocity of each joint of `tree.joints`. base (13,): position, quaternion, linear
@@ -89,11 +137,60 @@ class Robot:
         poses, twists = link_motions(self.tree.table, joints[None], base[None])
         return poses[0], twists[0]
 
+    def motions(
+        self,
+        q: Any,
+        qd: Any,
+        horizon: float,
+        *,
+        base: Any = (0.0, 0.0, 0.0),
+        tolerance: float = TUBE,
+        then: Then = "unknown",
+    ) -> dict[str, Trajectory]:
+        """Return the motion of each link with shapes, by its name, while all joints keep their rates.
 
-def takes_long(
-    urdf: Description, srdf: Description | None = None, packages: Mapping[str, Path] | None = None
-) -> bool:
-    """Return whether `make_robot` may take longer than 0.1 s for these texts, or for the meshes that they name.
+        q, qd: positions (rad or m) and rates (rad/s or m/s) of the joints, as numbers (J,) in the order of `joints`, or
+        by their names. A joint that reaches its limit stops there. horizon (s): how far ahead. base: where the base
+        link is, a pose, or how it moves, a Motion without an acceleration. tolerance (m): width of the tubes, within
+        which all points of a link are for certain; a link that one joint moves needs none. then: what holds after the
+        horizon; see Trajectory. Raises InputError and PoseError for anything else.
+
+        >>> arm = Robot("examples/arm/arm.urdf")
+        >>> moves = arm.motions([0, 0.2, 0, -2, 0, 2.2, 0.8, 0.03], [0.5, 0, 0, 0.3, 0, 0, 0, 0], horizon=2.0)
+        >>> moves["hand"].at(1.0).position.round(3)
+        array([0.36 , 0.196, 0.634])
+        """
+        joints, wanted = joint_values(self.joints, q, qd), Wanted(self.rows, self.radii)
+        made = planned_links(self.tree, wanted, joints, base, horizon, tolerance, then)
+        return dict(zip(self.links, made, strict=True))
+
+    @cached_property
+    def radii(self) -> Floats:
+        """Radii (S,) of spheres about the origins of the links that hold their shapes (m)."""
+        return np.array([radius_of(shapes) for shapes in self.shapes])
+
+
+def _description(given: _Source) -> Description:
+    return given if isinstance(given, Description) else Description.read(Path(given))
+
+
+def _disabled(
+    srdf: _Source | None, links: Sequence[str], model: Urdf, name: str
+) -> tuple[set[Pair], list[tuple[str, str]]]:  # fmt: skip
+    """Return the pairs that an SRDF disables, and a text about links that the robot lacks."""
+    if srdf is None:
+        return set(), []
+    description = _description(srdf)
+    pairs = disabled_pairs(description.text, description.name, links)
+    unknown = sorted({link for pair in pairs for link in pair} - set(model.links))
+    if not unknown:
+        return pairs, []
+    more = "" if len(unknown) <= _SHOWN else f" and {len(unknown) - _SHOWN} more"
+    return pairs, [("", f"{description.name}: expected links of {name}, got {', '.join(unknown[:_SHOWN])}{more}")]
+
+
+def takes_long(urdf: Description, srdf: Description | None = None, packages: Mapping[str, Path] | None = None) -> bool:
+    """Return whether `Robot` may take longer than 0.1 s for these texts, or for the meshes that they name.
 
     Raises InputError for a text that is no URDF.
     """
@@ -108,43 +205,3 @@ def takes_long(
         with suppress(InputError, OSError):  # what is not there takes no time
             size += files.find(address).stat().st_size
     return size > QUICK_MESHES
-
-
-def make_robot(urdf: Description, srdf: Description | None = None, packages: Mapping[str, Path] | None = None) -> Robot:
-    """Return the robot of a URDF, and of an SRDF if there is one. packages: folders of ROS packages by name.
-
-    A geometry that cannot be used is left out, and `problems` names it. Raises InputError if nothing is left, and for
-    files that are no URDF or SRDF.
-    """
-    model = parse_urdf(urdf.text, urdf.name)
-    tree = kinematic_tree(model)
-    files = FileLocator(urdf.folder, packages)
-    left_out: list[tuple[str, str]] = []
-    meshes: Meshes = {}
-    shapes: dict[str, tuple[tuple[Shape, Pose], ...]] = {}
-    for name in tree.links:
-        found, texts = link_shapes(model.links[name], files, meshes)
-        left_out += [(name, text) for text in texts]
-        if found:
-            shapes[name] = tuple(found)
-    if not shapes:
-        reason = f": {left_out[0][1]}" if left_out else ", only <visual> or nothing"
-        raise InputError(f"{urdf.name}: expected a link with a <collision> that can be used, got none{reason}")
-    disabled: set[Pair] = set()
-    if srdf is not None:
-        disabled = disabled_pairs(srdf.text, srdf.name, tree.links)
-        unknown = sorted({name for pair in disabled for name in pair} - set(model.links))
-        if unknown:
-            more = "" if len(unknown) <= _SHOWN else f" and {len(unknown) - _SHOWN} more"
-            text = f"{srdf.name}: expected links of {urdf.name}, got {', '.join(unknown[:_SHOWN])}{more}"
-            left_out.append(("", text))
-    rows = np.array([row for row, name in enumerate(tree.links) if name in shapes])
-    return Robot(
-        tree,
-        rows,
-        tuple(shapes.values()),
-        frozenset(touching_links(tree, shapes)),
-        frozenset(pair for pair in disabled if pair[0] in shapes and pair[1] in shapes),
-        frozenset(model.joints),
-        tuple(left_out),
-    )

@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from math import inf
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.errors import InputError
 from collision_monitor.settings.xml_tree import Element, parse_xml
 from collision_monitor.shapes.pose import Pose, from_rotation_vector, multiply
 
@@ -50,7 +52,10 @@ class Mimic:
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """A joint. origin: X_PC, the child's frame in the parent's at position 0; axis (3,): unit vector in the child's."""
+    """A joint. origin: X_PC, the child's frame in the parent's at position 0; axis (3,): unit vector in the child's.
+
+    limits: smallest and largest position (rad or m), infinite without one.
+    """
 
     name: str
     type: JointType
@@ -59,6 +64,7 @@ class Joint:
     origin: Pose
     axis: NDArray[np.float64]
     mimic: Mimic | None
+    limits: tuple[float, float]
     element: Element
 
 
@@ -154,8 +160,23 @@ def _joint(element: Element) -> Joint:
         _origin(element),
         np.array([1.0, 0.0, 0.0]) if axis is None else _unit(axis),
         None if mimic is None else _mimic(mimic),
+        _limits(element, kind),
         element,
     )
+
+
+def _limits(joint: Element, kind: str) -> tuple[float, float]:
+    """Return the limits of a joint. What is not there, or is no range of numbers, limits nothing: the joint goes on."""
+    limit = joint.first("limit")
+    if kind not in (JointType.REVOLUTE, JointType.PRISMATIC) or limit is None:
+        return -inf, inf
+    if not {"lower", "upper"} & limit.attributes.keys():
+        return -inf, inf
+    try:
+        lower, upper = limit.number("lower", 0.0), limit.number("upper", 0.0)
+    except InputError:
+        return -inf, inf
+    return (lower, upper) if lower <= upper else (-inf, inf)
 
 
 def _mimic(element: Element) -> Mimic:

@@ -12,7 +12,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from collision_monitor import records
-from collision_monitor.codec import Change, encode_descriptions, encode_states
+from collision_monitor.codec import Change, encode_descriptions, encode_states, encode_trajectories
 from collision_monitor.errors import InputError, MessageError
 from collision_monitor.monitor.state.timeline import Progress
 from collision_monitor.pipeline.topics import Topic
@@ -39,6 +39,9 @@ STATIC: Final = "tf_static"
 LISTEN_PERIOD: Final = 100_000_000
 """ns of the clock of receipt between two looks at topics that may have fallen silent."""
 
+HORIZON: Final = 2.0
+"""s that a monitor looks ahead by default."""
+
 MOST_TRANSFORMS: Final = 10_000
 """Transforms of a message, 0.1 s. A robot sends 100."""
 
@@ -57,7 +60,7 @@ Decode = Callable[[str, bytes], Any]
 
 
 class Input(NamedTuple):
-    """A message for the monitor. topic: STATES or SHAPES. Times in ns."""
+    """A message for the monitor. topic: STATES, SHAPES or TRAJECTORIES. Times in ns."""
 
     topic: Topic
     data: bytes
@@ -80,6 +83,7 @@ class Feed:
         *,
         allowance: int | None = None,
         preparation: RobotPreparation | None = None,
+        horizon: float = HORIZON,
     ) -> None:
         self.mapping = mapping
         self._time = SourceTime(
@@ -91,6 +95,7 @@ class Feed:
         ids = {entry.object_id for entry in mapping.sources}
         self.scene = SourceScene(mapping.frame, mapping.max_age, self._time, ids)
         self.scene.preparation = preparation
+        self.scene.horizon = horizon
         self._decode = decode
         self._allowance = allowance
         self._failures: list[SourceFailure] = []
@@ -359,6 +364,7 @@ class Feed:
             self._settle(at)
         yield from self._changes(raw.received)
         if at is not None:
+            yield from self._plans(raw.received)
             for step in self._due(at):
                 yield from (self._states(each, raw.received) for each in (*self._bridge(step.stamp_ns), step))
 
@@ -415,6 +421,11 @@ class Feed:
     def _changes(self, received: int) -> Iterator[Input]:
         if changes := self.scene.take_changes():
             yield self._descriptions(changes, received)
+
+    def _plans(self, received: int) -> Iterator[Input]:
+        for stamp, plans in self.scene.take_plans():
+            data = encode_trajectories(stamp, self.mapping.frame, plans)
+            yield Input(Topic.TRAJECTORIES, data, received, stamp)
 
     def _descriptions(self, changes: list[Change], received: int, *, snapshot: bool = False) -> Input:
         stamp = self._time.now_ns if self._time.has_begun else 0

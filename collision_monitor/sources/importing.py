@@ -85,6 +85,8 @@ def import_bag(
             feed = _feed_of(bag, mapping)
             frame_id, inputs = mapping.frame, _mapped_inputs(bag, feed)
         pipeline = Pipeline(profile, frame_id=frame_id, timed=False, rules=rules)
+        if feed is not None:
+            feed.scene.horizon = pipeline.profile.horizon
         _write(inputs, feed, target, pipeline, result, overwrite, progress)
     if feed is not None:
         result.states, result.skipped = dict(feed.scene.states), dict(feed.scene.refused)
@@ -109,7 +111,7 @@ def _write(
     if first is None:
         raise SessionError("expected messages of the mapped topics in the bag, got none")
     left_out = {Topic.SETTINGS}
-    left_out |= set() if feed is None else {Topic.TRAJECTORIES}
+    left_out |= set() if feed is None or "robots" in feed.mapping.sections else {Topic.TRAJECTORIES}
     left_out |= set() if pipeline.rules.text else {Topic.ALERTS}
     left_out |= set() if feed is not None else {Topic.SOURCES}
     types = {topic.of(): topic.message for topic in RECORDED if topic not in left_out}

@@ -202,6 +202,7 @@ def plans(dice: Dice, now_ns: int) -> bytes:
                 writer.raw(np.array(rows, "<f8").tobytes(), 8)
         wide = dice.random.choice((0.0, 1.0, 100.0))
         writer.raw(np.array([wide * dice.number(0.01, 1.0) for _ in range(4)], "<f8").tobytes(), 8)
+        writer.scalar("f8", dice.number(0.0, 0.05) if dice.chance(0.3) else 0.0, "tube")
         writer.scalar("u4", FIRST_ID + dice.random.randrange(IDS), "id")
         for what in ("between", "then"):
             writer.scalar("u1", dice.word(8) if dice.is_hostile else dice.random.randrange(2), what)

@@ -46,9 +46,7 @@ def contact(a, b, p=(0, 0, 0), R_A=EYE, R_B=EYE, margins=(0.0, 0.0), swap=False,
     assert abs(np.linalg.norm(gap[:3]) - 1) < 1e-12
     np.testing.assert_allclose(row[7:10], row[4:7] + row[0] * row[1:4], rtol=0, atol=1e-14 * scale)
     assert gap[3] <= max(row[0], 0.0), "the separation is a lower bound of the distance"
-    return Contact(
-        row[0], row[1:4], row[4:7], row[7:10], row[10], tuple(int(x) for x in row[11:]), gap[3], gap[:3]
-    )
+    return Contact(row[0], row[1:4], row[4:7], row[7:10], row[10], tuple(int(x) for x in row[11:]), gap[3], gap[:3])
 
 
 def size(shape) -> float:

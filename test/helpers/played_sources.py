@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from fed import Fed
+from fed import Fed, in_world
 from ros_messages import SECOND, header, message, pose, vector
 
 from collision_monitor.objects.description import ObjectDescription
@@ -39,7 +39,7 @@ class Played(Fed):
             self.messages += 1
             for step in self.steps[steps:]:
                 names = {it.object_id: name for name, it in self.objects.items()}
-                self.states = {names[int(row["id"])]: row for row in step.states}
+                self.states = {names[int(row["id"])]: row for row in in_world(step.states)}
             for change in self.changes[changes:]:
                 self.objects = {name: it for name, it in self.objects.items() if it.object_id != change.object_id}
                 if isinstance(change, ObjectDescription):
@@ -67,7 +67,7 @@ def base_row(position: Any, quaternion: Any = (0, 0, 0, 1), linear: Any = (0, 0,
 def check(played: Played, robot: Robot, joints: Any, base: Any, atol: float = 1e-12) -> None:
     """Compare all states with the kinematics of the robot."""
     assert played.states
-    poses, twists = robot.motions(np.array(joints, np.float64), base)
+    poses, twists = robot.states(np.array(joints, np.float64), base)
     for name, state in played.states.items():
         row = robot.tree.links.index(name.removeprefix("arm/"))
         for field, expected in (

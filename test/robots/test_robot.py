@@ -10,7 +10,7 @@ import trimesh
 
 from collision_monitor import Box, Capsule, Cylinder, Mesh, Sphere
 from collision_monitor.errors import InputError
-from collision_monitor.robots.robot import Description, Robot, make_robot
+from collision_monitor.robots.robot import Description, Robot
 
 ARM = Path(__file__).parents[2] / "examples/arm"
 MODELS = Path(__file__).parent / "models"
@@ -27,7 +27,7 @@ f 1 4 3
 
 def robot_of(collisions: str, folder: Path = Path()) -> Robot:
     text = f'<robot name="r">\n<link name="a">{collisions}</link>\n</robot>'
-    return make_robot(Description(text, "r.urdf", folder))
+    return Robot(Description(text, "r.urdf", folder))
 
 
 def geometry(text: str) -> str:
@@ -90,7 +90,7 @@ def test_addresses_of_meshes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     text = "".join(geometry(f'<mesh filename="{address}"/>') for address in addresses)
     (tmp_path / "robots/above/urdf").mkdir()
     description = Description(f'<robot><link name="a">{text}</link></robot>', "r.urdf", tmp_path / "robots/above/urdf")
-    robot = make_robot(description, packages={"given": tmp_path / "ours"})
+    robot = Robot(description, packages={"given": tmp_path / "ours"})
     assert len(robot.shapes[0]) == len(addresses) and not robot.problems
 
 
@@ -127,17 +127,17 @@ def test_a_file_that_is_missing_is_refused(tmp_path: Path) -> None:
 
 def test_srdf_and_construction_allow_pairs() -> None:
     srdf = Description.read(ARM / "arm.srdf")
-    arm = make_robot(Description.read(ARM / "arm.urdf"), srdf)
+    arm = Robot(Description.read(ARM / "arm.urdf"), srdf)
     assert arm.disabled == {("left_finger", "right_finger"), ("wrist_1", "wrist_3")} and not arm.problems
     assert ("hand", "wrist_3") in arm.touching  # rigid, over a flange without a shape
     assert ("hand", "wrist_2") not in arm.touching
     other = Description('<robot><disable_collisions link1="tail" link2="hand"/></robot>', "other.srdf")
-    (problem,) = make_robot(Description.read(ARM / "arm.urdf"), other).problems
+    (problem,) = Robot(Description.read(ARM / "arm.urdf"), other).problems
     assert problem.startswith("other.srdf: expected links of ") and problem.endswith("got tail")
 
 
 def test_links_without_shapes_pass_contact_on() -> None:
-    base = make_robot(Description.read(MODELS / "mobile_base.urdf"))
+    base = Robot(Description.read(MODELS / "mobile_base.urdf"))
     assert ("back_caster", "base_link") in base.touching  # over a fork without a shape
     assert ("mast", "torso") in base.touching and ("laser", "mast") in base.touching
     for pair in (("back_caster", "front_caster"), ("base_link", "torso"), ("left_wheel", "right_wheel")):
@@ -145,6 +145,6 @@ def test_links_without_shapes_pass_contact_on() -> None:
 
 
 def test_needs_are_the_joints_on_the_way_to_the_base() -> None:
-    arm = make_robot(Description.read(ARM / "arm.urdf"))
+    arm = Robot(Description.read(ARM / "arm.urdf"))
     needs = dict(zip(arm.tree.links, arm.tree.needs.sum(axis=1), strict=True))
     assert needs["base"] == 0 and needs["forearm"] == 4 and needs["hand"] == 7 and needs["right_finger"] == 8

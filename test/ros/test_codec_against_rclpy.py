@@ -96,6 +96,7 @@ def test_trajectories(seed: int) -> None:
         assert found == (list(wanted.times), [flat(p) for p in wanted.poses], [flat(t) for t in wanted.twists])
         assert each.tolerance.tolist() == [wanted.across, wanted.along, wanted.angle, wanted.time]
         assert (each.object_id, each.between, each.then) == (wanted.id, wanted.between, wanted.then)
+        assert each.tube == wanted.tube
     again = codec.encode_trajectories(it.stamp_ns, it.frame_id, it.trajectories)
     assert deserialize_message(again, msg.ObjectTrajectoryArray) == message
 

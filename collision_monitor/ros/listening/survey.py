@@ -166,7 +166,7 @@ def _noting(facts: TopicFacts, decoder: Decoder) -> Callable[[bytes], None]:
 def check(mapping: Mapping, seconds: float) -> tuple[list[LineReport], list[str]]:
     """Run the sources of a file without a monitor. Return what each of its lines did, and what is not monitored."""
     with _Listener("collision_monitor_check") as listener:
-        sources = LiveSources(listener.node, mapping, lambda given: None, lambda name, text, count: None)
+        sources = LiveSources(listener.node, mapping, lambda given: None, lambda name, text, count: None, HORIZON)
         sources.begin()
         listener.listen(seconds)
         sources.close()

@@ -15,7 +15,7 @@ from rclpy.executors import SingleThreadedExecutor
 
 from collision_monitor.errors import CollisionMonitorError
 from collision_monitor.ros.endpoints import message_class
-from collision_monitor.ros.monitor.live_sources import quality_of_all
+from collision_monitor.ros.monitor.topic_subscriptions import quality_of_all
 from collision_monitor.ros.names import is_topic_name
 from collision_monitor.ros.process import StopRequest
 

@@ -51,18 +51,25 @@ _TF: Final = ("/tf", "/tf_static")
 class LiveSources:
     """Subscribes to the topics of a sources file. take: called with each input for the monitor.
 
-    warn: called with the name of a line, a text and how often it happened.
+    warn: called with the name of a line, a text and how often it happened. horizon: s that the monitor looks ahead.
     Raises InputError for a topic whose name ROS does not accept.
     """
 
     def __init__(
-        self, node: Node, mapping: Mapping, take: Callable[[Input], None], warn: Callable[[str, str, int], None]
+        self,
+        node: Node,
+        mapping: Mapping,
+        take: Callable[[Input], None],
+        warn: Callable[[str, str, int], None],
+        horizon: float,
     ) -> None:
         self._node, self._take, self._warn = node, take, warn
         self._mapping = mapping
         self._decoder = Decoder({})
         self._preparation = RobotPreparation()
-        self._feed = Feed(mapping, self._decoder, allowance=AT_ONE_TIME, preparation=self._preparation)
+        self._feed = Feed(
+            mapping, self._decoder, allowance=AT_ONE_TIME, preparation=self._preparation, horizon=horizon
+        )  # fmt: skip
         self._large = LargeMessages(self._decoder)
         self._subscriptions = TopicSubscriptions(node, self._on_message)
         self._failures = FailureFiles(Path(get_logging_directory()))
@@ -93,6 +100,10 @@ class LiveSources:
         """End the thread and the processes that prepare what takes long."""
         self._large.close()
         self._preparation.close()
+
+    def look_ahead(self, horizon: float) -> None:
+        """Plan robots for a new horizon (s) of the monitor."""
+        self._feed.scene.horizon = horizon
 
     def set_pace(self, period: float) -> None:
         """Take no more than one step in `period` (s) of the stamps. States wait in the meantime, and newer ones win."""

@@ -156,13 +156,15 @@ class Monitoring:
         def take(given: Input) -> None:
             if given.topic is Topic.STATES:
                 self._take_step(ReceivedStates.decode(given.data))
+            elif given.topic is Topic.TRAJECTORIES:
+                self._on_trajectories(given.data)
             else:
                 self._on_shapes(given.data)
 
         def warn(name: str, text: str, count: int) -> None:
             self._refusals.note("sources", name, text, count, time.monotonic_ns())
 
-        return LiveSources(self._node, mapping, take, warn)
+        return LiveSources(self._node, mapping, take, warn, self._pipeline.profile.horizon)
 
     def _unmonitored(self) -> tuple[Unmonitored, ...]:
         """Return what the sources file asks for and is not monitored."""
@@ -279,6 +281,8 @@ class Monitoring:
         """Take the next steps with this profile, with the details of contacts only if anything reads them."""
         now, self._chosen = self._now(), profile
         change = self._pipeline.change_settings(self._readers.used(profile), now, self._name)
+        if self._sources is not None:
+            self._sources.look_ahead(profile.horizon)
         self._recording.write(Topic.SETTINGS, change.settings, now, now, settings=self._pipeline.settings())
         if change.shapes is not None:
             self._record_shapes(change.shapes, now)

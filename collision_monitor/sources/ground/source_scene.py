@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.codec import Change, Removal
+from collision_monitor.codec import Change, ObjectTrajectory, Removal
 from collision_monitor.errors import InputError, reason_of
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.shapes.pose import Pose
@@ -52,7 +52,8 @@ class SourceScene:
     points_dropped: by the key, points of scans without a place (NaN). unmonitored: what the file asks for and the
     monitor does not have. received_ns: when the message that is processed arrived. allowance: new descriptions of small
     objects that this message may still make; None: any number. is_behind: whether some wait, because it was used up.
-    preparation: makes robots that take long (`RobotPreparation`); None: they are made at once.
+    preparation: makes robots that take long (`RobotPreparation`); None: they are made at once. horizon: s that the
+    monitor looks ahead.
     """
 
     def __init__(self, frame: str, max_age: float, time: SourceTime, taken_ids: Collection[int] = ()) -> None:
@@ -73,6 +74,8 @@ class SourceScene:
         self.allowance: float | None = None
         self.is_behind = False
         self.preparation: Any = None
+        self.horizon = 0.0
+        self._plans: list[tuple[int, list[ObjectTrajectory]]] = []
         self._described: dict[int, ObjectDescription] = {}
         self._changes: list[Change] = []
         self._taken_ids = frozenset(taken_ids)
@@ -135,6 +138,16 @@ class SourceScene:
             names = [name if name in self.states else _FURTHER for name in names]
         self.states.update(names)
         self.waiting.put(states, stamp_ns, covariance, window, turns=turns)
+
+    def follow(self, plans: list[ObjectTrajectory], stamp_ns: int) -> None:
+        """Let described objects follow plans in the monitor's frame, whose time 0 is the stamp."""
+        if plans:
+            self._plans.append((stamp_ns, plans))
+
+    def take_plans(self) -> list[tuple[int, list[ObjectTrajectory]]]:
+        """Return the plans since the last call, with their stamps (ns)."""
+        plans, self._plans = self._plans, []
+        return plans
 
     def locate(self, name: str, frame: str, stamp_ns: int) -> FrameMotion | None:
         """Return pose and twist of a frame in the monitor's frame; None, after a refusal, if tf does not say.

@@ -199,7 +199,7 @@ def _base_in_link(robot: Robot, link: str, what: str, scene: SourceScene) -> Fra
         return None
     if row == 0:
         return IDENTITY
-    poses, _ = robot.motions(np.zeros((len(robot.tree.joints), 2)), np.eye(1, 13, 6)[0])
+    poses, _ = robot.states(np.zeros((len(robot.tree.joints), 2)), np.eye(1, 13, 6)[0])
     return _at_rest(Pose(poses[row, :3], poses[row, 3:])).inverse()
 
 

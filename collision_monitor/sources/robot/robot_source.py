@@ -13,7 +13,7 @@ from collision_monitor.errors import InputError, PoseError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
 from collision_monitor.robots import link_motions
-from collision_monitor.robots.robot import Description, Robot, make_robot, takes_long
+from collision_monitor.robots.robot import Description, Robot, takes_long
 from collision_monitor.robots.srdf import Pair
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.sources.ground.frames import FrameMotion
@@ -27,6 +27,7 @@ from collision_monitor.sources.robot.joint_table import JointTable
 from collision_monitor.sources.robot.link_rules import LinkRules, allowed_contacts
 from collision_monitor.sources.robot.robot_base import BaseMotion, FixedBase, FrameBase, at_links, robot_base
 from collision_monitor.sources.robot.robot_entry import RobotEntry
+from collision_monitor.sources.robot.robot_plans import RobotPlans
 
 Floats = NDArray[np.float64]
 
@@ -73,6 +74,7 @@ class RobotSource(Source):
         self._standing: dict[int, Pose] = {}  # poses of the links that are rigid with it
         self._moving = CarriedBodies((), ())
         self._needs = np.zeros((0, 0), np.bool_)
+        self._plans: RobotPlans | None = None
         self._unknown_joints: set[str] = set()
         topics = {entry.joint_states: (JOINT_STATE,), entry.urdf_topic: (TEXT,), entry.srdf_topic: (TEXT,)}
         self.topics: Table[str, tuple[str, ...]] = {
@@ -122,6 +124,8 @@ class RobotSource(Source):
         self._base.restart()
         if self.robot is not None:
             self._joints.restart()
+        if self._plans is not None:
+            self._plans.restart()
 
     def settle(self, now_ns: int, scene: SourceScene) -> None:
         """See Source. Observes the bodies about which there is news."""
@@ -136,7 +140,7 @@ class RobotSource(Source):
         values, known, speed_known = self._joints.at(now_ns)
         if base is None:
             return
-        poses, twists = self.robot.motions(values, base.row)
+        poses, twists = self.robot.states(values, base.row)
         if self._finds_standing(base, poses):
             self._describe(scene)
         due = (self._needs & fresh).any(axis=1) | base_is_fresh
@@ -154,6 +158,7 @@ class RobotSource(Source):
             scene.has(self.name, f"{self.name}: joints")
         if len(chosen):
             self._observe(chosen, base, poses, twists, speed_known, now_ns, scene)
+            self._plan(base, values, known & speed_known, now_ns, scene)
 
     # -- for a planning scene
 
@@ -188,7 +193,7 @@ class RobotSource(Source):
         self._joints.fresh, self._base.fresh = fresh, base_is_fresh
         if base is None or not known[self.robot.tree.needs[row]].all():
             return None
-        poses, twists = self.robot.motions(values, base.row)
+        poses, twists = self.robot.states(values, base.row)
         return FrameMotion(poses[row, :3], poses[row, 3:], twists[row, :3], twists[row, 3:], moving=True)
 
     # -- descriptions
@@ -252,7 +257,7 @@ class RobotSource(Source):
                 scene.lacks(self.name, f"{self.name}/{link}", "; ".join(texts))
 
     def _make(self, urdf: Description) -> Robot:
-        return self._accept(make_robot(urdf, self._srdf, self._entry.packages))
+        return self._accept(Robot(urdf, self._srdf, self._entry.packages))
 
     def _accept(self, robot: Robot) -> Robot:
         """Take over a robot. Raises InputError if the file says more about it than it has."""
@@ -284,7 +289,7 @@ class RobotSource(Source):
         self._standing = {}
         if isinstance(self._base, FixedBase):  # its links stand from the start
             base = self._base.motion(0, robot, scene)
-            self._finds_standing(base, robot.motions(self._joints.at(0)[0], base.row)[0])
+            self._finds_standing(base, robot.states(self._joints.at(0)[0], base.row)[0])
             self._base.fresh = True
         self._describe(scene)
 
@@ -313,6 +318,8 @@ class RobotSource(Source):
         moving = [it for it in bodies if it.object_id in self._described and it.object_id not in self._standing]
         self._moving = CarriedBodies(moving, self.robot.tree.links)
         self._needs = self.robot.tree.needs[self._moving.rows]
+        padding = self._entry.padding + max(rules.padding.values(), default=0.0)
+        self._plans = RobotPlans(self.robot.tree, moving, padding, rules.scale, self._plans)
 
     def _digest(self, body: Body) -> bytes:
         """Return what is equal for equal shapes, computed once for each."""
@@ -374,7 +381,18 @@ class RobotSource(Source):
                 states[field_name] = column
         unknown = (self._needs[chosen] & ~speed_known).any(axis=1) | (not base.motion.twist_known)
         states["flags"][unknown] |= np.uint32(StateFlag.TWIST_UNKNOWN)
-        scene.observe(self.name, states, now_ns)
+        scene.observe(self.name, states, now_ns, turns=True)
+
+    def _plan(
+        self, base: BaseMotion, values: Floats, known: NDArray[np.bool_], now_ns: int, scene: SourceScene
+    ) -> None:  # fmt: skip
+        """Let the bodies follow the joints at their rates. The errors of a base that has some count on arcs only."""
+        assert self._plans is not None
+        usable: NDArray[np.bool_] = ~(self._needs & ~known).any(axis=1)
+        if base.stddev.any() or not base.motion.twist_known:
+            usable[:] = False
+        with scene.guard(self.name, "plans"):
+            scene.follow(self._plans.due(now_ns, values, base.row, usable, scene.horizon), now_ns)
 
     def _refuse_unknown(self, names: Any, scene: SourceScene) -> None:
         """Count each joint once that no robot of the file has."""

@@ -13,7 +13,7 @@ import sys
 
 from collision_monitor.errors import reason_of
 from collision_monitor.pipeline.model_worker import JOB, limit_this_process, receive, send
-from collision_monitor.robots.robot import make_robot
+from collision_monitor.robots.robot import Robot
 
 
 def main() -> None:
@@ -25,7 +25,7 @@ def main() -> None:
     limit, _ = JOB.unpack_from(job)
     signal.setitimer(signal.ITIMER_REAL, limit)
     try:
-        made = pickle.dumps(make_robot(*pickle.loads(job[JOB.size :])))
+        made = pickle.dumps(Robot(*pickle.loads(job[JOB.size :])))
     except Exception as error:  # see `reason_of`
         made = pickle.dumps(reason_of(error))
     send(results, made)

@@ -27,7 +27,7 @@ from played_sources import MILLISECOND, START, Played, base_row, check, transfor
 from ros_messages import message, point, pose
 
 from collision_monitor import Box, Cone, ConvexHull, Cylinder, HalfSpace, Mesh, Sphere
-from collision_monitor.robots.robot import Description, make_robot
+from collision_monitor.robots.robot import Description, Robot
 from collision_monitor.shapes.pose import Pose, multiply, rotation_matrix
 
 TF = "tf2_msgs/msg/TFMessage"
@@ -126,9 +126,9 @@ def test_an_attached_object_moves_with_its_link() -> None:
     assert touched == {"arm/hand", "arm/left_finger", "arm/right_finger"} and not cup.static
     played.joints(START + MILLISECOND, *joints.T)
     state = played.states.pop("arm/cup")
-    robot = make_robot(Description.read(ARM))
+    robot = Robot(Description.read(ARM))
     check(played, robot, joints, base_row((1, 2, 0.5)))
-    poses, twists = robot.motions(joints, base_row((1, 2, 0.5)))
+    poses, twists = robot.states(joints, base_row((1, 2, 0.5)))
     row = robot.tree.links.index("hand")
     arm_of = rotation_matrix(poses[row, 3:]) @ offset.position
     np.testing.assert_allclose(state["position"], poses[row, :3] + arm_of, rtol=0, atol=1e-12)
@@ -191,7 +191,7 @@ def test_the_allowed_collision_matrix_adds_pairs_and_takes_those_of_the_srdf_bac
     rows[0, 1] = rows[1, 0] = rows[0, 4] = rows[4, 0] = True
     played.send("/scene", SCENE, a_scene(allowed_collision_matrix=matrix(names, rows, wall=True)))
     added = {("base", "table"), ("base", "forearm")} | {
-        (min(name, "wall"), max(name, "wall")) for name in make_robot(Description.read(ARM)).links
+        (min(name, "wall"), max(name, "wall")) for name in Robot(Description.read(ARM)).links
     }
     assert allowed_pairs(played) == (before | added) - {("left_finger", "right_finger")}
     played.send("/scene", SCENE, a_scene(allowed_collision_matrix=matrix(["a", "b"], rows[:1])))

@@ -14,7 +14,7 @@ from ros_messages import SECOND, definitions, header, message, pose, vector
 
 from collision_monitor.errors import InputError
 from collision_monitor.records import Model, StateFlag
-from collision_monitor.robots.robot import Description, Robot, make_robot
+from collision_monitor.robots.robot import Description, Robot
 from collision_monitor.shapes.pose import multiply, rotation_matrix
 from collision_monitor.sources import import_bag
 from collision_monitor.sources.decoding import Decoder
@@ -30,7 +30,7 @@ BOLTED: dict[str, Any] = {"urdf": str(ARM), "joint_states": "/joint_states", "ba
 
 
 def arm() -> Robot:
-    return make_robot(Description.read(ARM))
+    return Robot(Description.read(ARM))
 
 
 def test_the_links_of_a_bolted_arm_move_with_its_joints() -> None:
@@ -201,7 +201,7 @@ def test_keys_of_a_robot_reach_its_links() -> None:
     assert all((it.padding, it.group, it.mask) == (0.02, 2, 5) for it in links.values())
     assert all(it.model is Model.CONVEX_HULL for it in links.values())
     assert played.objects["floor"].object_id in links["arm/base"].allowed
-    robot = make_robot(Description.read(ARM), Description.read(ARM.with_suffix(".srdf")))
+    robot = Robot(Description.read(ARM), Description.read(ARM.with_suffix(".srdf")))
     for a in robot.links:
         expected = {b for pair in robot.touching | robot.disabled if a in pair for b in pair if b != a}
         ids = {links[f"arm/{b}"].object_id for b in expected}
