@@ -16,7 +16,7 @@ from collision_monitor.motion.stated_motion import ACCELERATION, ANGULAR, COURSE
 from collision_monitor.motion.trajectory import FASTEST, Then, Trajectory, carried
 from collision_monitor.robots.constant_rates import constant_rates
 from collision_monitor.robots.kinematic_tree import KinematicTree
-from collision_monitor.robots.link_pieces import BaseBound, Pieces, Wanted, link_pieces
+from collision_monitor.robots.link_pieces import BaseBound, LinkPieces, Wanted, link_pieces
 from collision_monitor.shapes.pose import Pose, as_pose
 from collision_monitor.shapes.reach import reach
 from collision_monitor.shapes.registry import Shape
@@ -24,7 +24,7 @@ from collision_monitor.tolerances import LARGEST_INPUT
 
 Floats = NDArray[np.float64]
 
-TUBE: Final = 2e-3
+TUBE: Final = 1.5e-3
 """m: width of the tubes of links. Larger: fewer pieces, by the root, and impacts that are known less exactly."""
 
 LONGEST: Final = 600.0
@@ -41,7 +41,7 @@ class LinkPlans(NamedTuple):
 
     times: Floats  # (N,): s from now on
     rows: NDArray[np.intp]  # (B,): of the bodies in the tree
-    pieces: Pieces
+    pieces: LinkPieces
 
     def points(self, b: int) -> tuple[Floats, Floats]:
         """Return times (n,) and poses (n, 7) of body b, between which it moves along arcs."""

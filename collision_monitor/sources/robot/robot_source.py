@@ -26,7 +26,7 @@ from collision_monitor.sources.robot.collision_objects import pose_bytes, shape_
 from collision_monitor.sources.robot.joint_table import JointTable
 from collision_monitor.sources.robot.link_rules import LinkRules, allowed_contacts
 from collision_monitor.sources.robot.robot_base import BaseMotion, FixedBase, FrameBase, at_links, robot_base
-from collision_monitor.sources.robot.robot_entry import RobotEntry
+from collision_monitor.sources.robot.robot_entry import JOINTS, RobotEntry
 from collision_monitor.sources.robot.robot_plans import RobotPlans
 
 Floats = NDArray[np.float64]
@@ -389,7 +389,7 @@ class RobotSource(Source):
         """Let the bodies follow the joints at their rates. The errors of a base that has some count on arcs only."""
         assert self._plans is not None
         usable = ~(self._needs & ~known).any(axis=1)
-        if base.stddev.any() or not base.motion.twist_known:
+        if base.stddev.any() or not base.motion.twist_known or self._entry.motion != JOINTS:
             usable[:] = False
         with scene.guard(self.name, "plans"):
             scene.follow(self._plans.due(now_ns, values, base.row, usable, scene.horizon), now_ns)
