@@ -63,9 +63,9 @@ class RobotPlans:
         )
         self._reach = max(float(lengths + max(sizes, default=0.0)), 1.0)
         known = set() if before is None else {it for it, has in zip(before._ids, before._has_plan, strict=True) if has}
-        self._has_plan = np.array([each in known for each in self._ids], np.bool_)
+        self._has_plan: Mask = np.array([each in known for each in self._ids], np.bool_)
         self._made: tuple[int, float, Floats, Floats] | None = None  # when, how long, of which joints and base
-        self._waits = before is not None and before._waits
+        self._waits: bool = before is not None and before._waits
 
     def restart(self) -> None:
         """Forget what the monitor forgets when time jumps."""

@@ -13,6 +13,7 @@ from collision_monitor.errors import InputError, PoseError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
 from collision_monitor.robots import link_motions
+from collision_monitor.robots.link_plans import load_link_plans
 from collision_monitor.robots.robot import Description, Robot, takes_long
 from collision_monitor.robots.srdf import Pair
 from collision_monitor.shapes.pose import Pose
@@ -81,6 +82,7 @@ class RobotSource(Source):
             topic: types for topic, types in {**topics, **self._base.topics}.items() if topic
         }
         link_motions.load_link_motions()
+        load_link_plans()
         if entry.urdf is not None:
             try:
                 self._make(entry.urdf)
@@ -388,7 +390,7 @@ class RobotSource(Source):
     ) -> None:  # fmt: skip
         """Let the bodies follow the joints at their rates. The errors of a base that has some count on arcs only."""
         assert self._plans is not None
-        usable = ~(self._needs & ~known).any(axis=1)
+        usable: NDArray[np.bool_] = np.asarray(~(self._needs & ~known).any(axis=1))
         if base.stddev.any() or not base.motion.twist_known or self._entry.motion != JOINTS:
             usable[:] = False
         with scene.guard(self.name, "plans"):
