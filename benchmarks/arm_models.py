@@ -52,10 +52,12 @@ class Truth:
         self.robot, self.limits = robot, robot.tree.limits
         table = robot.tree.table
         self._fixed = [Rotation.from_quat(each) for each in np.array(table.quaternion)]
-        self.shapes: Any = {
-            name: [(_fcl_shape(shape), Rotation.from_quat(np.array(pose.quaternion)), np.array(pose.position)) for shape, pose in parts]
-            for name, parts in zip(robot.links, robot.shapes, strict=True)
-        }
+        self.shapes: dict[str, list[Any]] = {}
+        for name, parts in zip(robot.links, robot.shapes, strict=True):
+            self.shapes[name] = [
+                (_fcl_shape(shape), Rotation.from_quat(np.array(at.quaternion)), np.array(at.position))
+                for shape, at in parts
+            ]
 
     def joints(self, q: Array, qd: Array, t: float) -> Array:
         """Positions of the joints at a time: each stops at its limit."""
@@ -203,7 +205,9 @@ def table(robot: cm.Robot, count: int, seed: int) -> None:
     """Print the rows of arms."""
     truth, rng = Truth(robot), np.random.default_rng(seed)
     encounters = [encounter(truth, rng) for _ in range(count)]
-    head = "| What moves | its states say | horizon (s) | true | false | missed | late | early p99 (ms) | open, not true |"
+    head = (
+        "| What moves | its states say | horizon (s) | true | false | missed | late | early p99 (ms) | open, not true |"
+    )
     print(f"{head}\n|---|---|---|---|---|---|---|---|---|")
     for by_joints in (False, True):
         for horizon in HORIZONS:

@@ -14,8 +14,9 @@ import numpy as np
 
 from collision_monitor._jit import device, inlined, outlined
 from collision_monitor._jit.vectors import LANES
-from collision_monitor.geometry.vector import Vector, opposite
+from collision_monitor.geometry.vector import Vector
 from collision_monitor.impact.advance import advance_along_axis, in_motion
+from collision_monitor.impact.apart import apart_until
 from collision_monitor.impact.impact_record import (
     CLEAR,
     CLOSED_FORM,
@@ -33,9 +34,7 @@ from collision_monitor.meshes.distance.nearest import MEMORY, PLACE_A, PLACE_B, 
 from collision_monitor.motion.bodies import next_pair
 from collision_monitor.motion.motion import (
     MOTION,
-    acceleration_within,
     half_acceleration,
-    most_turning,
     position_at,
     set_piece,
     smooth_until,
@@ -375,65 +374,10 @@ def _clear_until(
         placed = place_pair(table, parts, ShapePair(A, B, a, b), begin, scratch)
         gap = separation(table, a, b, placed.pose, scratch.out, scratch.work) - query.margin - query.tolerance
         n = (scratch.out[0], scratch.out[1], scratch.out[2])
-        until = _apart_until(bodies.pieces, A, B, n, (spin_a, spin_b), gap - tube.start, tube.growth, begin, until)
+        until = apart_until(bodies.pieces, A, B, n, (spin_a, spin_b), gap - tube.start, tube.growth, begin, until)
         queries += 1
         a, b = next_pair(parts, first_b, a, b)
     return until, queries
-
-
-@outlined
-def _apart_until(
-    pieces: Any, A: Any, B: Any, n: Vector, radii: tuple[float, float], gap: float, growth: float, begin: float,
-    end: float,
-) -> float:  # fmt: skip
-    """Begin of the first pieces that may close a gap (m) along n, which is that of two motions at `begin`; else end."""
-    t, one, other, until_a, until_b = begin, A.piece, B.piece, A.until, B.until
-    m_a, m_b = A, B
-    while gap > 0.0:
-        stop = min(end, until_a, until_b)
-        own, its = _approach(pieces, m_a, n, t, stop), _approach(pieces, m_b, opposite(n), t, stop)
-        turned = growth * (stop - t)
-        turned += own.turning * radii[0] if own.turning > 0.0 else 0.0
-        turned += its.turning * radii[1] if its.turning > 0.0 else 0.0
-        if not max(own.along, 0.0) + max(its.along, 0.0) + own.bulge + its.bulge + turned < gap:
-            return t
-        gap, t = gap - own.along - its.along - turned, stop
-        if t >= end:
-            return end
-        if until_a <= t:
-            one += 1
-            m_a, until_a = pieces[one], pieces[one].until
-        if until_b <= t:
-            other += 1
-            m_b, until_b = pieces[other], pieces[other].until
-    return t
-
-
-class Approach(NamedTuple):
-    """How far a body goes in a direction on a piece."""
-
-    along: Any  # m: of its origin
-    turning: Any  # rad: by which it turns at most
-    bulge: Any  # m: by which its origin is farther in between
-
-
-@inlined
-def _approach(pieces: Any, m: Any, n: Vector, begin: float, end: float) -> Approach:
-    """How far the motion m (MOTION) goes along n between two times (s), at the end and in between."""
-    h = end - begin
-    v2 = m.vx * m.vx + m.vy * m.vy + m.vz * m.vz
-    turning = most_turning(m, begin, end) * h
-    if v2 == 0.0:
-        return Approach(0.0, turning, 0.0)
-    x, y, z = position_at(m, begin)
-    if end == m.until:
-        k = m.piece + 1
-        dx, dy, dz = pieces[k].x - x, pieces[k].y - y, pieces[k].z - z
-    else:
-        there = position_at(m, end)
-        dx, dy, dz = there[0] - x, there[1] - y, there[2] - z
-    bulge = 0.125 * acceleration_within(m, begin, end) * h * h
-    return Approach(dx * n[0] + dy * n[1] + dz * n[2], turning, bulge)
 
 
 @device

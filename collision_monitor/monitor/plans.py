@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import allocating_kernel, inlined
+from collision_monitor._jit import allocating_kernel, inlined, kernel
 from collision_monitor.broad_phase.hashed_grid import HashedGrid, put_box
 from collision_monitor.errors import InputError, Refusal
 from collision_monitor.geometry.vector import dot, magnitude
@@ -46,7 +46,6 @@ from collision_monitor.motion.motion import (
 from collision_monitor.motion.stated_motion import ACCELERATION, ANGULAR, COURSE, LINEAR, REST
 from collision_monitor.motion.trajectory import Tolerance, Trajectory
 from collision_monitor.records import PlanFlag
-from collision_monitor.shapes.pose import rotation_matrix
 from collision_monitor.uncertainty.spread import surface_spread, swing_radius
 
 PLAN: Final = np.dtype(
@@ -90,6 +89,9 @@ ENDED: Final = "object {id}: expected a plan that is not over, got one that ende
 FOLLOWS, LEFT, OVER = range(3)
 """What becomes of a plan in a step."""
 
+ROOMY: Final = 10_000
+"""Pieces of all plans up to which there is room for two new plans in place of each."""
+
 MOST_PIECES: Final = 10_000_000
 """Pieces of all plans together, 3 GB."""
 
@@ -123,18 +125,23 @@ class Plans(Stage):
 
         stamp_ns: that time as a stamp; None: the first step. Raises InputError if there are MOST_PIECES already.
         """
-        self.drop(roster, np.array([i], np.int32))
-        count, start = len(plan.numbers), zero or 0.0
-        first = self._place(roster, count)
-        _write_pieces(self._pieces[first : first + count], first, plan, start)
-        row = np.zeros(1, PLAN)
+        count, start, known = len(plan.numbers), zero or 0.0, np.flatnonzero(self._rows["slot"] == i)
+        if not len(known):
+            self._rows = np.concatenate([self._rows, np.zeros(1, PLAN)])
+            known = np.array([len(self._rows) - 1])
+        row, room = self._rows[known[0]], self._rows["count"][known[0]]
+        row["count"] = 0
+        first = row["first"] if count <= room else self._place(roster, count)
+        write_pieces(self._pieces, int(first), plan.numbers, plan.begins, start, float(plan.times[0]))
+        roster.bodies.motion["until"][i] = inf
+        for name in ("lately", "drifted", "apart", "turned"):
+            row[name] = 0.0
         row["tube"], row["ends"] = plan.tubes.max(), plan.times[-1] + start
         row["slot"], row["first"], row["count"] = i, first, count
         row["fresh"], row["waits"] = True, zero is None
         row["stamp"] = NO_STAMP if stamp_ns is None else stamp_ns
         for name, value in tolerance._asdict().items():
             row[name] = value
-        self._rows = np.concatenate([self._rows, row])
         roster.bodies.planned[i] = True
 
     def _place(self, roster: Roster, count: int) -> int:
@@ -146,7 +153,7 @@ class Plans(Stage):
         needed = int(rows["count"].sum()) + count
         if needed > MOST_PIECES:
             raise InputError(f"trajectory: expected at most {MOST_PIECES} pieces of all plans together, got {needed}")
-        kept = np.zeros(2 * needed, MOTION)
+        kept = np.zeros(2 * needed + min(needed, ROOMY), MOTION)
         end = _move(rows, self._pieces, kept, roster.bodies.motion)
         self._pieces = kept
         roster.bodies = roster.bodies._replace(pieces=kept)
@@ -290,17 +297,23 @@ def _move(rows: Any, pieces: Any, kept: Any, motion: Any) -> int:
     return at
 
 
-def _write_pieces(pieces: Any, first: int, plan: Trajectory, start: float) -> None:
-    """Write a plan into pieces (M,) MOTION. first: index of the first piece; start: time 0 of the plan (s)."""
-    for c, axis in enumerate("xyz"):
-        pieces[axis], pieces[f"v{axis}"] = plan.numbers[:, c], plan.numbers[:, LINEAR + c]
-        pieces[f"w{axis}"], pieces[f"a{axis}"] = plan.numbers[:, ANGULAR + c], plan.numbers[:, ACCELERATION + c]
-    pieces["rotation"] = rotation_matrix(plan.numbers[:, 3:LINEAR])
-    pieces["time"] = plan.begins + start
-    pieces["time"][0] = plan.times[0] + start  # it stands until then
-    pieces["course"], pieces["rest"] = plan.numbers[:, COURSE], pieces["time"] + plan.numbers[:, REST]
-    pieces["until"][:-1], pieces["until"][-1] = plan.begins[1:] + start, inf
-    pieces["piece"] = first + np.arange(len(pieces))
+@kernel
+def write_pieces(pieces: Any, first: int, numbers: Any, begins: Any, start: float, first_time: float) -> None:
+    """Write a plan of motions (M, NUMBERS) from begins (M,) on into pieces (first …) MOTION.
+
+    start: time 0 of the plan (s). first_time: of its first point, until which the body stands.
+    """
+    for k in range(len(begins)):
+        row, piece = numbers[k], pieces[first + k]
+        piece.x, piece.y, piece.z = row[0], row[1], row[2]
+        piece.vx, piece.vy, piece.vz = row[LINEAR], row[LINEAR + 1], row[LINEAR + 2]
+        piece.wx, piece.wy, piece.wz = row[ANGULAR], row[ANGULAR + 1], row[ANGULAR + 2]
+        piece.ax, piece.ay, piece.az = row[ACCELERATION], row[ACCELERATION + 1], row[ACCELERATION + 2]
+        quaternion_to_matrix(numbers[:, 3:7], k, piece.rotation)
+        piece.time = (begins[k] if k else first_time) + start
+        piece.course, piece.rest = int(row[COURSE]), piece.time + row[REST]
+        piece.until = begins[k + 1] + start if k + 1 < len(begins) else inf
+        piece.piece = first + k
 
 
 @inlined

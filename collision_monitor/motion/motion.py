@@ -298,6 +298,20 @@ def turn_quaternion(q: Any, i: int, wx: float, wy: float, wz: float, t: float, o
 
 
 @inlined
+def turn_between(a: Any, b: Any) -> Vector:
+    """Rotation vector of the shortest turn from the pose a (7,) to the pose b, along the world's axes (rad)."""
+    x, y, z, w = b[3], b[4], b[5], b[6]
+    p, q, r, o = -a[3], -a[4], -a[5], a[6]
+    tx, ty, tz = w * p + x * o + y * r - z * q, w * q - x * r + y * o + z * p, w * r + x * q - y * p + z * o
+    tw = w * o - x * p - y * q - z * r
+    if tw < 0.0:
+        tx, ty, tz, tw = -tx, -ty, -tz, -tw
+    sine = sqrt(tx * tx + ty * ty + tz * tz)
+    factor = 2.0 * np.arctan2(sine, tw) / sine if sine > 0.0 else 2.0
+    return factor * tx, factor * ty, factor * tz
+
+
+@inlined
 def chord_angle(ax: float, ay: float, az: float, aw: float, bx: float, by: float, bz: float, bw: float) -> float:
     """Upper bound on the angle (rad) between two unit quaternions; exact to second order for small angles."""
     dot = ax * bx + ay * by + az * bz + aw * bw

@@ -12,11 +12,11 @@ from typing import Any, Final, Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor._jit import allocating_kernel, outlined
+from collision_monitor._jit import allocating_kernel, kernel, outlined
 from collision_monitor.checks.numbers import as_numbers, checked_number
 from collision_monitor.errors import PoseError
 from collision_monitor.motion.course import ARC, STRAIGHT, bends, screw_velocity, turned_for
-from collision_monitor.motion.motion import turn_quaternion, twist_on
+from collision_monitor.motion.motion import turn_between, turn_quaternion, twist_on
 from collision_monitor.motion.stated_motion import (
     ACCELERATION,
     ANGULAR,
@@ -27,7 +27,7 @@ from collision_monitor.motion.stated_motion import (
     Motion,
 )
 from collision_monitor.shapes.planar import flat_quaternions
-from collision_monitor.shapes.pose import Frozen, Pose, as_pose, shortest_turns
+from collision_monitor.shapes.pose import Frozen, Pose, as_pose
 from collision_monitor.tolerances import EPSILON, LARGEST_INPUT, NORMALISED, UNIT_QUATERNION
 
 Array = NDArray[np.float64]
@@ -133,7 +133,8 @@ class Trajectory(Frozen):
         known["between"], known["then"] = between, then
         known["tube"] = tube = checked_number(tube, "tube", "m", least=0.0, error=PoseError)
         spans = np.diff(times)
-        turns = _rotation_vectors(poses[:-1, 3:], poses[1:, 3:])
+        turns = np.empty((len(spans), 3))
+        _rotation_vectors(poses, turns)
         rows = _still_rows(poses[:-1])
         begins, tubes = times[:-1], np.zeros(len(spans))
         with np.errstate(over="ignore"):  # what overflows is too fast
@@ -301,14 +302,17 @@ def _still_rows(poses: Array) -> Array:
     return rows
 
 
-def _rotation_vectors(before: Array, after: Array) -> Array:
-    """Rotation vectors (N, 3) of the shortest rotations from quaternions (N, 4) to others, in world axes (rad)."""
-    turn, factor = shortest_turns(before, after)
-    turn[np.linalg.norm(turn, axis=1) <= 0.5 * ROUND_OFF_ANGLE] = 0.0
-    return turn * factor[:, None]
+@kernel
+def _rotation_vectors(poses: Any, turns: Any) -> None:
+    """Write the rotation vectors (rad, world axes) of the shortest turns between poses (N, 7) to turns (N - 1, 3)."""
+    for k in range(len(turns)):
+        x, y, z = turn_between(poses[k], poses[k + 1])
+        if x * x + y * y + z * z <= ROUND_OFF_ANGLE * ROUND_OFF_ANGLE:
+            x = y = z = 0.0
+        turns[k, 0], turns[k, 1], turns[k, 2] = x, y, z
 
 
-@allocating_kernel
+@kernel
 def _bend_rows(rows: Any, moved: Any, turns: Any, spans: Any) -> None:
     """Let motions (N, NUMBERS) be arcs on which bodies move by `moved` (N, 3) and turn by rotation vectors (N, 3)."""
     for k in range(len(rows)):

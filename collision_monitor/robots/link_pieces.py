@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from collision_monitor._jit import device, inlined, kernel
 from collision_monitor.geometry.vector import Vector, magnitude, scaled
 from collision_monitor.motion.course import ARC, STRAIGHT, bends, place_on, screw_velocity
-from collision_monitor.motion.motion import quaternion_to_matrix
+from collision_monitor.motion.motion import quaternion_to_matrix, turn_between
 from collision_monitor.motion.trigonometry import sin_cos
 from collision_monitor.robots.constant_rates import NODES, JointSpans
 from collision_monitor.robots.kinematic_tree import SLIDING, TURNING, KinematicTree
@@ -56,7 +56,7 @@ class BaseBound(NamedTuple):
     screws: float  # 0: it stands; 1: its motion is one screw; 2: it is not
 
 
-class Bounds(NamedTuple):
+class ChainBounds(NamedTuple):
     """Bounds on the motion of L links in each of S spans."""
 
     turning: Any  # (S, L): angular speed (rad/s)
@@ -64,7 +64,7 @@ class Bounds(NamedTuple):
     screws: Any  # (S, L): number of joints that move it
 
 
-class Pieces(NamedTuple):
+class LinkPieces(NamedTuple):
     """For each of B bodies the points of its plan, as nodes."""
 
     points: Any  # (B, most) int32: nodes at the ends of its pieces
@@ -75,7 +75,7 @@ class Pieces(NamedTuple):
 
 def link_pieces(
     tree: KinematicTree, wanted: Wanted, spans: JointSpans, base: Floats, bound: BaseBound, tolerance: float
-) -> Pieces:
+) -> LinkPieces:
     """The plans of some links at constant joint rates. base (N, 13): motion of the base link at the nodes.
 
     tolerance (m): tubes are narrower, unless a link moves too fast for MOST_PIECES.
@@ -83,8 +83,8 @@ def link_pieces(
     poses, _ = link_motions(tree.table, spans.joints, base)
     count, most = len(wanted.rows), (len(spans.times) - len(spans.first) + 1) // NODES + 1
     shape = len(spans.first) - 1, len(tree.links)
-    bounds = Bounds(np.zeros(shape), np.zeros(shape), np.zeros(shape))
-    found = Pieces(np.zeros((count, most), np.int32), np.zeros(count, np.int32), np.zeros(count), poses)
+    bounds = ChainBounds(np.zeros(shape), np.zeros(shape), np.zeros(shape))
+    found = LinkPieces(np.zeros((count, most), np.int32), np.zeros(count, np.int32), np.zeros(count), poses)
     _choose_pieces(tree.table, wanted, spans, bound, float(tolerance), bounds, found, np.zeros((5, 3, 3)))
     return found
 
@@ -158,7 +158,7 @@ def _error(
     if screws <= 1.0 and turning * h <= MOST_TURN:
         return 0.0
     a, b = poses[k, i], poses[k + size, i]
-    moved, turn = (b[0] - a[0], b[1] - a[1], b[2] - a[2]), _turn_between(a, b)
+    moved, turn = (b[0] - a[0], b[1] - a[1], b[2] - a[2]), turn_between(a, b)
     shift = screw_velocity(moved, turn)
     course = ARC if bends(shift, turn) else STRAIGHT
     v, w = scaled(shift, 1.0 / h), scaled(turn, 1.0 / h)
@@ -212,20 +212,6 @@ def _size(work: Any, x: float, y: float, z: float) -> float:
             entry = work[4, 0, a] * work[4, 0, b] + work[4, 1, a] * work[4, 1, b] + work[4, 2, a] * work[4, 2, b]
             total += entry * entry
     return sqrt(sqrt(total))
-
-
-@inlined
-def _turn_between(a: Any, b: Any) -> Vector:
-    """Rotation vector of the shortest turn from the pose a to the pose b (7,), along the world's axes (rad)."""
-    x, y, z, w = b[3], b[4], b[5], b[6]
-    p, q, r, o = -a[3], -a[4], -a[5], a[6]
-    tx, ty, tz = w * p + x * o + y * r - z * q, w * q - x * r + y * o + z * p, w * r + x * q - y * p + z * o
-    tw = w * o - x * p - y * q - z * r
-    if tw < 0.0:
-        tx, ty, tz, tw = -tx, -ty, -tz, -tw
-    sine = sqrt(tx * tx + ty * ty + tz * tz)
-    factor = 2.0 * np.arctan2(sine, tw) / sine if sine > 0.0 else 2.0
-    return factor * tx, factor * ty, factor * tz
 
 
 @device

@@ -12,11 +12,22 @@ from numpy.typing import NDArray
 from collision_monitor.checks.numbers import as_numbers, checked_number
 from collision_monitor.errors import InputError
 from collision_monitor.motion.course import ARC
-from collision_monitor.motion.stated_motion import ACCELERATION, ANGULAR, COURSE, LINEAR, NUMBERS, REST, Motion
+from collision_monitor.motion.stated_motion import (
+    ACCELERATION,
+    ANGULAR,
+    COURSE,
+    LINEAR,
+    NUMBERS,
+    REST,
+    Motion,
+    set_courses,
+    straight_motions,
+)
 from collision_monitor.motion.trajectory import FASTEST, Then, Trajectory, carried
 from collision_monitor.robots.constant_rates import constant_rates
-from collision_monitor.robots.kinematic_tree import KinematicTree
-from collision_monitor.robots.link_pieces import BaseBound, Pieces, Wanted, link_pieces
+from collision_monitor.robots.kinematic_tree import KinematicTree, kinematic_tree
+from collision_monitor.robots.link_pieces import BaseBound, LinkPieces, Wanted, link_pieces
+from collision_monitor.robots.urdf import parse_urdf
 from collision_monitor.shapes.pose import Pose, as_pose
 from collision_monitor.shapes.reach import reach
 from collision_monitor.shapes.registry import Shape
@@ -24,7 +35,7 @@ from collision_monitor.tolerances import LARGEST_INPUT
 
 Floats = NDArray[np.float64]
 
-TUBE: Final = 2e-3
+TUBE: Final = 1.5e-3
 """m: width of the tubes of links. Larger: fewer pieces, by the root, and impacts that are known less exactly."""
 
 LONGEST: Final = 600.0
@@ -41,7 +52,7 @@ class LinkPlans(NamedTuple):
 
     times: Floats  # (N,): s from now on
     rows: NDArray[np.intp]  # (B,): of the bodies in the tree
-    pieces: Pieces
+    pieces: LinkPieces
 
     def points(self, b: int) -> tuple[Floats, Floats]:
         """Return times (n,) and poses (n, 7) of body b, between which it moves along arcs."""
@@ -64,6 +75,17 @@ def link_plans(
         raise InputError(f"expected at most {MOST_WORK} poses of links for one plan, got {work}: too many joints stop")
     moves = carried(np.tile(base, (len(spans.times), 1)), spans.times)[:, :ACCELERATION]
     return LinkPlans(spans.times, wanted.rows, link_pieces(tree, wanted, spans, moves, bound, tolerance))
+
+
+def load_link_plans() -> None:
+    """Compile the kernels, or load them from the cache, before messages arrive."""
+    joint = '<joint name="{0}" type="continuous"><parent link="{0}"/><child link="{1}"/></joint>'
+    links = "".join(f'<link name="{each}"/>' for each in "abc")
+    text = f"<robot>{links}{joint.format('a', 'b')}{joint.format('b', 'c')}</robot>"
+    tree = kinematic_tree(parse_urdf(text, "warm-up"))
+    base = straight_motions(np.eye(1, ACCELERATION, 6))
+    set_courses(base, False, True, False)
+    link_plans(tree, Wanted(np.array([2]), np.ones(1)), np.ones((2, 2)), base[0], 1.0)
 
 
 def planned_links(

@@ -25,7 +25,7 @@ from foreign_bag import STORE, odometry, pose_stamped, transforms
 from ros_messages import definitions
 from source_messages import MAKERS, SourceMessage, hostile_source_message
 
-from collision_monitor.codec import decode_descriptions, decode_states
+from collision_monitor.codec import decode_descriptions, decode_states, decode_trajectories
 from collision_monitor.errors import MessageError
 from collision_monitor.pipeline.topics import Topic
 from collision_monitor.sources import Decoder, Feed, Input, RawMessage
@@ -244,6 +244,8 @@ class SourceCampaign:
                 rows += list(states)
                 if len(np.unique(states["id"])) != len(states):
                     self.problems.append("a step holds two states of one object")
+            elif each.topic is Topic.TRAJECTORIES:
+                decode_trajectories(each.data)
             else:
                 message = decode_descriptions(each.data)
                 self.summary.descriptions += len(message.objects)

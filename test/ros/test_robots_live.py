@@ -92,7 +92,7 @@ def test_a_robot_over_dds(start: Callable[..., Any], team: Any, tmp_path: Path) 
     expected = feed.begin(0)
     for topic, kind, content in played():
         expected += feed.take(RawMessage(topic, kind, cdr(kind, content), 0))
-    kinds = {Topic.STATES.message, Topic.SHAPES.message}
+    kinds = {Topic.STATES.message, Topic.SHAPES.message, Topic.TRAJECTORIES.message}
     live = [(m.type, bytes(m.data)) for m in Session(tmp_path / "live.mcap").messages() if m.type in kinds]
     assert live == [(each.topic.message, each.data) for each in expected], process.words
     assert sum(kind == Topic.STATES.message for kind, _ in live) == 10 and not feed.scene.refused

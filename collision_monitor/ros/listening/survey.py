@@ -20,6 +20,7 @@ from collision_monitor.ros.monitor.live_sources import LiveSources
 from collision_monitor.ros.monitor.topic_subscriptions import quality_of_all
 from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.sources import Decoder, Mapping
+from collision_monitor.sources.feed import HORIZON
 from collision_monitor.sources.ground.frames import frame_name
 from collision_monitor.sources.kinds import BY_TYPE
 from collision_monitor.sources.messages.marker_arrays import MarkerArrays

@@ -27,6 +27,7 @@ from collision_monitor.ros.names import is_topic_name
 from collision_monitor.session.mcap.definitions import definition
 from collision_monitor.sources import Decoder, Feed, Input, Mapping, RawMessage, Unmonitored
 from collision_monitor.sources.failures import FailureFiles
+from collision_monitor.sources.feed import HORIZON
 from collision_monitor.sources.messages.transform_arrays import TRANSFORMS
 from collision_monitor.sources.robot.robot_preparation import RobotPreparation
 
@@ -61,7 +62,7 @@ class LiveSources:
         mapping: Mapping,
         take: Callable[[Input], None],
         warn: Callable[[str, str, int], None],
-        horizon: float,
+        horizon: float = HORIZON,
     ) -> None:
         self._node, self._take, self._warn = node, take, warn
         self._mapping = mapping

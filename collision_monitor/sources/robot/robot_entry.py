@@ -31,8 +31,9 @@ from collision_monitor.sources.ground.yaml_table import known, number, pose, tab
 
 _KEYS: Final = (
     *("urdf", "urdf_topic", "srdf", "srdf_topic", "packages", "joint_states", "base", "planning_scene"),
-    *("padding", "group", "mask", "model", "allowed"),
+    *("padding", "group", "mask", "model", "allowed", "motion"),
 )
+JOINTS, ARC = "joints", "arc"
 _BASE: Final = ("frame", "odometry", "link", "pose")
 _MODELS: Final = tuple(model.name.lower() for model in Model)
 
@@ -53,7 +54,10 @@ class BaseEntry:
 
 @dataclass(frozen=True)
 class RobotEntry:
-    """A robot of the file. urdf, srdf: None if a topic holds it. allowed: ids of objects by the name of a link."""
+    """A robot of the file. urdf, srdf: None if a topic holds it. allowed: ids of objects by the name of a link.
+
+    motion: JOINTS, the links are predicted along their joints, or ARC, along their twists.
+    """
 
     name: str
     urdf: Description | None
@@ -69,6 +73,7 @@ class RobotEntry:
     mask: int = 0
     model: Model = Model.AUTO
     allowed: dict[str, list[int]] = field(default_factory=dict)
+    motion: str = JOINTS
 
 
 def read_robots(content: Any, mapping: Mapping) -> list[RobotEntry]:
@@ -98,8 +103,12 @@ def _robot(name: str, content: dict[str, Any], mapping: Mapping) -> RobotEntry:
     model = content.get("model", "auto")
     if model not in _MODELS:
         raise InputError(f"{name}, model: expected one of {', '.join(_MODELS)}, got {model!r}")
+    motion = content.get("motion", JOINTS)
+    if motion not in (JOINTS, ARC):
+        raise InputError(f"{name}, motion: expected {JOINTS} or {ARC}, got {motion!r:.80}")
     return RobotEntry(
         name=name,
+        motion=motion,
         urdf=_description(given["urdf"], f"{name}, urdf", files),
         srdf=_description(given["srdf"], f"{name}, srdf", files),
         urdf_topic=given["urdf_topic"],

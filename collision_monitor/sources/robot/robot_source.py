@@ -13,6 +13,7 @@ from collision_monitor.errors import InputError, PoseError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
 from collision_monitor.robots import link_motions
+from collision_monitor.robots.link_plans import load_link_plans
 from collision_monitor.robots.robot import Description, Robot, takes_long
 from collision_monitor.robots.srdf import Pair
 from collision_monitor.shapes.pose import Pose
@@ -26,7 +27,7 @@ from collision_monitor.sources.robot.collision_objects import pose_bytes, shape_
 from collision_monitor.sources.robot.joint_table import JointTable
 from collision_monitor.sources.robot.link_rules import LinkRules, allowed_contacts
 from collision_monitor.sources.robot.robot_base import BaseMotion, FixedBase, FrameBase, at_links, robot_base
-from collision_monitor.sources.robot.robot_entry import RobotEntry
+from collision_monitor.sources.robot.robot_entry import JOINTS, RobotEntry
 from collision_monitor.sources.robot.robot_plans import RobotPlans
 
 Floats = NDArray[np.float64]
@@ -81,6 +82,7 @@ class RobotSource(Source):
             topic: types for topic, types in {**topics, **self._base.topics}.items() if topic
         }
         link_motions.load_link_motions()
+        load_link_plans()
         if entry.urdf is not None:
             try:
                 self._make(entry.urdf)
@@ -388,8 +390,8 @@ class RobotSource(Source):
     ) -> None:  # fmt: skip
         """Let the bodies follow the joints at their rates. The errors of a base that has some count on arcs only."""
         assert self._plans is not None
-        usable: NDArray[np.bool_] = ~(self._needs & ~known).any(axis=1)
-        if base.stddev.any() or not base.motion.twist_known:
+        usable: NDArray[np.bool_] = np.asarray(~(self._needs & ~known).any(axis=1))
+        if base.stddev.any() or not base.motion.twist_known or self._entry.motion != JOINTS:
             usable[:] = False
         with scene.guard(self.name, "plans"):
             scene.follow(self._plans.due(now_ns, values, base.row, usable, scene.horizon), now_ns)

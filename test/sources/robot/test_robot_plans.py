@@ -86,6 +86,12 @@ def test_one_joint_alone_needs_no_plan() -> None:
     assert not played.plans and len(played.states) == 10
 
 
+def test_the_file_may_ask_for_arcs() -> None:
+    played = Played({**BOLTED, "motion": "arc"})
+    played.joints(START, PLACE, MOVING)
+    assert not played.plans and len(played.states) == 10
+
+
 @pytest.mark.parametrize("rate", [1e18, 1e5, np.nan])
 def test_rates_that_cannot_be_followed_make_no_plan_that_is_wrong(rate: float) -> None:
     played = Played(BOLTED)

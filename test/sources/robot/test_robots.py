@@ -223,6 +223,7 @@ def test_keys_of_a_robot_reach_its_links() -> None:
         ({**BOLTED, "padding": -1}, "arm, padding: expected a number of m from 0"),
         ({**BOLTED, "allowed": {"base": ["floor"]}}, "arm, allowed: 'floor' is unknown"),
         ({**BOLTED, "allowed": ["floor"]}, "arm, allowed: expected lists of objects by link"),
+        ({**BOLTED, "motion": "straight"}, "arm, motion: expected joints or arc, got 'straight'"),
         ({**BOLTED, "packages": ["a"]}, "arm, packages: expected a table of folders by package"),
     ],
 )
