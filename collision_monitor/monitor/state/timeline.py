@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import Final
 
-from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage, whole
+from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage, whole_fact
 
 NANOSECOND: Final = 1e-9
 
@@ -129,11 +129,11 @@ class Timeline(Stage):
     def restore(self, snapshot: Snapshot, facts: Facts) -> None:
         """See Stage."""
         origin, old, late = facts["origin_ns"], facts["old_ns"], facts["late_ns"]
-        self._origin_ns = None if origin is None else whole(origin, "origin_ns")
-        self.now_ns, self.restarts = whole(facts["now_ns"], "now_ns"), whole(facts["restarts"], "restarts")
-        self._jumps = [whole(stamp, "jumps") for stamp in facts["jumps"]][-MOST_JUMPS:]
-        self._old_ns = None if old is None else whole(old, "old_ns")
+        self._origin_ns = None if origin is None else whole_fact(origin, "origin_ns")
+        self.now_ns, self.restarts = whole_fact(facts["now_ns"], "now_ns"), whole_fact(facts["restarts"], "restarts")
+        self._jumps = [whole_fact(stamp, "jumps") for stamp in facts["jumps"]][-MOST_JUMPS:]
+        self._old_ns = None if old is None else whole_fact(old, "old_ns")
         self._late_ns = None
         if late is not None:
             first, last = late
-            self._late_ns = whole(first, "late_ns"), whole(last, "late_ns")
+            self._late_ns = whole_fact(first, "late_ns"), whole_fact(last, "late_ns")
