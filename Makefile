@@ -14,7 +14,8 @@ unexport PYTHONHOME _ROS_WHEELS_BOOTSTRAP_COMPLETE
 # Without bytecode beside the sources every process would compile what it imports: half a second for a node.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup setup-demo interfaces demo test test-core test-ros test-fast coverage lint format docs fuzz fuzz-files soak bench bench-peers release-tree clean
+.PHONY: help setup setup-demo interfaces demo test test-core test-ros test-fast coverage lint format docs fuzz fuzz-files fuzz-inputs soak bench bench-peers \
+	release-tree clean
 .DEFAULT_GOAL := help
 
 help: ## list the targets
@@ -76,6 +77,9 @@ fuzz: setup ## attack the monitor with hostile messages; ARGS="--messages 100000
 
 fuzz-files: setup ## read damaged and hostile copies of sessions; ARGS="--files 100000"
 	@$(BIN)/python test/attacks/fuzz_sessions.py $(ARGS)
+
+fuzz-inputs: setup ## read damaged bags, meshes, robot descriptions and YAML; ARGS="--files 100000"
+	@$(BIN)/python test/attacks/fuzz_inputs.py $(ARGS)
 
 soak: setup ## simulate 24 h of objects that come, change and go, and compare with plain recomputation; ARGS="--hours 1"
 	@$(BIN)/python benchmarks/soak.py $(ARGS)

@@ -33,7 +33,7 @@ from collision_monitor.monitor.contacts.plain_contacts import plain_contact
 from collision_monitor.monitor.contacts.solid_overlap import overlap_of_solid
 from collision_monitor.monitor.event_list import NO_EVENTS
 from collision_monitor.monitor.state.roster import Roster
-from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
+from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage, whole_fact
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.narrow_phase.contact_row import DISTANCE
 from collision_monitor.records import Model, Phase
@@ -213,7 +213,7 @@ class ActivePairs(Stage):
         self._carried = snapshot.array("carried", no_answers())
         if len(self._carried) not in (0, len(self.pairs)):
             raise InputError(f"snapshot, carried: expected {len(self.pairs)} rows or none, got {len(self._carried)}")
-        self._orphans = [(key, since) for key, since in facts["orphans"]]
+        self._orphans = [(whole_fact(key, "orphans"), float(since)) for key, since in facts["orphans"]]
 
 
 @kernel

@@ -23,7 +23,7 @@ from collision_monitor.monitor.contacts.patches import with_patches
 from collision_monitor.monitor.event_list import EventList
 from collision_monitor.monitor.result import Refused, StepResult, StepStatus
 from collision_monitor.monitor.state.roster import count_bodies
-from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
+from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage, whole_fact
 from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.motion.last_state import age_of
 from collision_monitor.narrow_phase.contact_row import (
@@ -137,7 +137,7 @@ class Answers(Stage):
 
     def restore(self, snapshot: Snapshot, facts: Facts) -> None:
         """See Stage."""
-        self.step_count, self.digest = facts["step"], facts["digest"]
+        self.step_count, self.digest = whole_fact(facts["step"], "step"), whole_fact(facts["digest"], "digest")
         if facts["last"] is not None:
             stamp_ns, step, status = facts["last"]
             contacts = snapshot.array("contacts", np.empty(0, records.CONTACT))

@@ -1,6 +1,6 @@
 """Reads damaged copies of the files of others: bags, meshes, robot descriptions and YAML.
 
-    make fuzz-files ARGS="--inputs --files 100000"
+    make fuzz-inputs ARGS="--files 100000"
     python test/attacks/fuzz_inputs.py --files 1000 --seed 1 --kinds bag mesh
     python test/attacks/fuzz_inputs.py --only 4711      the file of one seed, kept, with what it led to
 

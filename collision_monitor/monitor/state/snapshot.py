@@ -127,6 +127,13 @@ def check_range(name: str, values: NDArray[Any], low: int, high: int) -> None:
         )
 
 
+def whole_fact(value: Any, name: str) -> int:
+    """Return a fact that is a whole number. Raises InputError for others: a kernel may never end with a time of NaN."""
+    if not isinstance(value, int) or isinstance(value, bool) or not -(2**63) <= value < 2**64:
+        raise InputError(f"snapshot, {name}: expected a whole number of 64 bits, got {value!r:.80}")
+    return value
+
+
 class Stage(ABC):
     """A stage of the monitor's step. It keeps its state between two steps, and saves and restores it."""
 

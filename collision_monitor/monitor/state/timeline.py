@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import Final
 
-from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
+from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage, whole_fact
 
 NANOSECOND: Final = 1e-9
 
@@ -128,9 +128,12 @@ class Timeline(Stage):
 
     def restore(self, snapshot: Snapshot, facts: Facts) -> None:
         """See Stage."""
-        self._origin_ns, self.now_ns, self.restarts = facts["origin_ns"], facts["now_ns"], facts["restarts"]
-        self._jumps, self._old_ns = list(facts["jumps"]), facts["old_ns"]
+        origin, old, late = facts["origin_ns"], facts["old_ns"], facts["late_ns"]
+        self._origin_ns = None if origin is None else whole_fact(origin, "origin_ns")
+        self.now_ns, self.restarts = whole_fact(facts["now_ns"], "now_ns"), whole_fact(facts["restarts"], "restarts")
+        self._jumps = [whole_fact(stamp, "jumps") for stamp in facts["jumps"]][-MOST_JUMPS:]
+        self._old_ns = None if old is None else whole_fact(old, "old_ns")
         self._late_ns = None
-        if facts["late_ns"] is not None:
-            first, last = facts["late_ns"]
-            self._late_ns = first, last
+        if late is not None:
+            first, last = late
+            self._late_ns = whole_fact(first, "late_ns"), whole_fact(last, "late_ns")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any, Final
 
 import numpy as np
@@ -49,11 +49,18 @@ def shape_digest(shapes: Parts) -> bytes:
     """Return what is equal for equal shapes at equal poses."""
     digest = hashlib.blake2b(digest_size=16)
     for shape, at in shapes:
-        digest.update(type(shape).__name__.encode())
-        for field in fields(shape):
-            digest.update(np.ascontiguousarray(getattr(shape, field.name)).tobytes())
+        kind: Any = type(shape)
+        digest.update(kind.__name__.encode())
+        for name in _names_of(kind):
+            digest.update(np.ascontiguousarray(getattr(shape, name)).tobytes())
         digest.update(at.position.tobytes() + at.quaternion.tobytes())
     return digest.digest()
+
+
+@cache
+def _names_of(kind: type[Shape]) -> tuple[str, ...]:
+    """Return the names of the fields of a kind of shape."""
+    return tuple(field.name for field in fields(kind))
 
 
 def pose_bytes(pose: Pose) -> tuple[bytes, bytes]:

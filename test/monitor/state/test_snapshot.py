@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -167,6 +168,12 @@ def broken(change: str, snapshot: Snapshot) -> Snapshot:
             facts["monitor"]["last"] = [1, 2, {"strange": 3}]
         case "an object of infinite size":
             facts["monitor"]["memory"] = dict.fromkeys(facts["monitor"]["memory"], float("inf"))
+        case "a time that is no number" | "a time that is infinite" | "a time that is a text" | "a time of 65 bits":
+            values = {"no number": math.nan, "infinite": math.inf, "a text": "now", "of 65 bits": 2**64}
+            facts["monitor"]["now_ns"] = next(value for name, value in values.items() if change.endswith(name))
+        case "origin_ns" | "jumps" | "late_ns" | "step" | "orphans":
+            wrong = {"jumps": [math.nan], "late_ns": [0, math.nan], "orphans": [[-1.5, 0.0]]}
+            facts["monitor"][change] = wrong.get(change, math.nan)
         case "no facts of the pipeline":
             del facts["pipeline"]
     return Snapshot(arrays, facts)
@@ -178,7 +185,8 @@ def broken(change: str, snapshot: Snapshot) -> Snapshot:
         "an array is missing", "an array is of another type", "an array is shorter", "vertices that are not there",
         "an event of a body that is not there", "shapes in a circle", "a slot that is free and used",
         "facts are missing", "facts of another kind", "an object of infinite size",
-        "no facts of the pipeline",
+        "no facts of the pipeline", "a time that is no number", "a time that is infinite", "a time that is a text",
+        "a time of 65 bits", "origin_ns", "jumps", "late_ns", "step", "orphans",
     ],
 )  # fmt: skip
 def test_a_snapshot_that_does_not_fit_is_refused(change: str) -> None:
