@@ -6,6 +6,7 @@ import json
 import re
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -120,6 +121,16 @@ print(json.dumps({"compiled": compiled, "contacts": contacts}))
 def warmed() -> None:
     """Compile what is not compiled yet, as the set-up does."""
     subprocess.run([sys.executable, "-m", "collision_monitor.warm_up"], check=True)
+
+
+def test_the_command_compiles_what_is_not_compiled_and_says_where_it_is(warmed: None) -> None:
+    command = [sys.executable, "-m", "collision_monitor", "warm-up"]
+    done = subprocess.run([*command, "functions"], capture_output=True, text=True, timeout=600)
+    said = re.fullmatch(r"0 functions compiled in \d+ s; the kernels are in (.*)\n", done.stdout)
+    assert said and list(Path(said[1]).iterdir()), (done.stdout, done.stderr)
+    wrong = subprocess.run([*command, "robots"], capture_output=True, text=True, timeout=60)
+    assert (wrong.returncode, wrong.stdout) == (2, "")
+    assert "expected parts of monitor, options, functions, got 'robots'" in wrong.stderr
 
 
 WATCHED = START + """

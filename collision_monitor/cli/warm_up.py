@@ -6,6 +6,7 @@ import argparse
 import time
 from typing import Final
 
+from collision_monitor.cli.options.usage import UsageError
 from collision_monitor.cli.output.exit_codes import ExitCode
 from collision_monitor.cli.output.progress import progress_anywhere
 from collision_monitor.errors import InputError
@@ -18,14 +19,14 @@ compiler. A container image or an installation in /opt runs it while it is built
 
 The kernels go to NUMBA_CACHE_DIR, or to the first of these folders that can be written to: var/cache in the
 virtual environment (/var/cache without one), the user's cache, a temporary folder. They are read
-from all of them, also where they cannot be written. NUMBA_CPU_NAME, such as x86-64-v3, compiles for
-other processors than this one; set it when they run, too.
+from all of them, also where they cannot be written. NUMBA_CPU_NAME, such as x86-64-v3, with an empty
+NUMBA_CPU_FEATURES compiles for other processors than this one; set both when they run, too.
 """
 EPILOG = """\
 examples:
   collision-monitor warm-up
   collision-monitor warm-up monitor                             a node's steps with plain settings
-  NUMBA_CPU_NAME=x86-64-v3 collision-monitor warm-up            an image for several kinds of processors
+  NUMBA_CPU_NAME=x86-64-v3 NUMBA_CPU_FEATURES= collision-monitor warm-up     for several kinds of processors
 
 exit codes:
   0  done
@@ -43,7 +44,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument(
-        "parts", nargs="*", choices=[[], *PARTS], metavar="PART",
+        "parts", nargs="*", metavar="PART",
         help=f"{', '.join(PARTS)} (default: all): a monitor's steps; uncertain states, budgets and contacts of many "
         "points; the functions for two shapes",
     )  # fmt: skip
@@ -51,11 +52,13 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def warm_up_command(args: argparse.Namespace) -> int:
-    """Run the command and return the exit code. Raises InputError if the kernels cannot be kept."""
+    """Run the command and return the exit code. Raises UsageError; InputError if the kernels cannot be kept."""
     from collision_monitor import warm_up
     from collision_monitor._jit.compilation import FUNCTIONS, CompilationProgress, listening
     from collision_monitor._jit.places import is_trusted, kernel_places
 
+    if unknown := [part for part in args.parts if part not in PARTS]:
+        raise UsageError(f"expected parts of {', '.join(PARTS)}, got {unknown[0]!r}")
     compiled, began = 0, time.monotonic()
     for part in args.parts or PARTS:
         with progress_anywhere(f"compiling: {part}", FUNCTIONS[part]) as advance:
