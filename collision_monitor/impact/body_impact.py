@@ -16,14 +16,12 @@ from collision_monitor._jit import device, inlined, outlined
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.geometry.vector import Vector
 from collision_monitor.impact.advance import advance_along_axis, in_motion
-from collision_monitor.impact.apart import apart_until
 from collision_monitor.impact.impact_record import (
     CLEAR,
     CLOSED_FORM,
     CONSERVATIVE_ADVANCEMENT,
     HIT,
     UNRESOLVED,
-    write_pair,
 )
 from collision_monitor.impact.mesh_impact import mesh_impact
 from collision_monitor.impact.mesh_pair import SURFACES, has_mesh, shapes_within, triangles_contact
@@ -36,7 +34,6 @@ from collision_monitor.motion.motion import (
     MOTION,
     half_acceleration,
     position_at,
-    set_piece,
     smooth_until,
 )
 from collision_monitor.motion.placed_pair import place_pair
@@ -308,95 +305,10 @@ class BodyPair(NamedTuple):
 
 
 @device
-def body_impact(
-    multibody: Any, i: int, j: int, window: Window, query: ImpactQuery, scratch: Scratch, event: Any
-) -> int:
-    """Write the first impact of bodies i and j in the window into the IMPACT record `event`.
-
-    event.status = CLEAR if there is none. Bodies that overlap, or are within query.margin, at the begin have their
-    impact there. The reference motions and their tubes are those in `bodies`; in the record, i is the body with the
-    smaller id. Bodies that follow plans are searched piece by piece. Returns the number of distance queries.
-    """
-    table, parts, bodies = multibody
-    if bodies.id[i] > bodies.id[j]:
-        i, j = j, i
-    A, B = bodies.motion[i], bodies.motion[j]
-    a, b, spin_a, spin_b = bodies.first_shape[i], bodies.first_shape[j], bodies.spin_radius[i], bodies.spin_radius[j]
-    begin, end = window
-    queries, unresolved, is_near = 0, inf, False
-    while True:
-        if A.until <= begin:
-            A = scratch.piece[0]
-            _set_piece_at(bodies, i, begin, A)
-        if B.until <= begin:
-            B = scratch.piece[1]
-            _set_piece_at(bodies, j, begin, B)
-        pair = BodyPair(A, B, a, b, spin_a, spin_b)
-        if min(A.until, B.until) < end and not is_near:
-            apart, n = _clear_until(multibody, pair, Window(begin, end), query, scratch)
-            queries, is_near, begin = queries + n, apart == begin, apart
-            if begin >= end:
-                event.status = CLEAR
-                break
-            continue
-        stop, is_near = min(end, A.until, B.until), False
-        queries += chains_impact(table, parts, pair, Window(begin, stop), query, scratch, event)
-        if event.status != CLEAR:
-            unresolved = min(unresolved, event.lower)
-        if event.status == HIT or stop >= end:
-            break
-        begin = stop
-    if unresolved < inf:  # what is open in one piece may be certain in the next
-        event.lower = unresolved
-        if event.status == CLEAR:
-            event.status, event.upper = UNRESOLVED, inf
-    if event.status != CLEAR:
-        write_pair(bodies, i, j, event)
-    return queries
-
-
-@outlined
-def _clear_until(
-    multibody: Any, pair: BodyPair, window: Window, query: ImpactQuery, scratch: Scratch
-) -> tuple[float, int]:  # fmt: skip
-    """Time until which two bodies, one of which follows a plan, are certainly apart, by one distance for each shape.
-
-    Along the normal of that distance, whole pieces bring them nearer by no more than the gap. Returns that time, the
-    begin of a piece or the window's end, and the number of distance queries. Of meshes it knows nothing.
-    """
-    table, parts, bodies = multibody
-    A, B, a, first_b, spin_a, spin_b = pair
-    begin, until = window
-    b, queries, tube = first_b, 0, tube_of(A, B, begin)
-    while a >= 0 and until > begin:
-        if has_mesh(table, a, b):
-            return begin, queries
-        placed = place_pair(table, parts, ShapePair(A, B, a, b), begin, scratch)
-        gap = separation(table, a, b, placed.pose, scratch.out, scratch.work) - query.margin - query.tolerance
-        n = (scratch.out[0], scratch.out[1], scratch.out[2])
-        until = apart_until(bodies.pieces, A, B, n, (spin_a, spin_b), gap - tube.start, tube.growth, begin, until)
-        queries += 1
-        a, b = next_pair(parts, first_b, a, b)
-    return until, queries
-
-
-@device
-def _set_piece_at(bodies: Any, i: int, t: float, piece: Any) -> None:
-    """Write the piece of body i's plan that holds from time t on into `piece` (MOTION), with the body's tube."""
-    m = bodies.motion[i]
-    k = m.piece
-    while bodies.pieces[k].until <= t:
-        k += 1
-    set_piece(bodies.pieces[k], piece)
-    piece.radius, piece.cover, piece.covered = m.radius, m.cover, m.covered
-    piece.tube_0, piece.tube_1, piece.tube_time = m.tube_0, m.tube_1, m.tube_time
-
-
-@device
 def chains_impact(
     table: Any, parts: Any, pair: BodyPair, window: Window, query: ImpactQuery, scratch: Scratch, event: Any
 ) -> int:
-    """`body_impact` of two chains of shapes (`BodyPair`), without what names the bodies in the record.
+    """Write the first impact of two chains of shapes (`BodyPair`) in the window into the IMPACT record `event`.
 
     This is the impact of any two bodies: of the monitor, of single queries and of their batches.
     """

@@ -10,9 +10,10 @@ import numpy as np
 from collision_monitor._jit import inlined, kernel
 from collision_monitor._jit.direct import direct
 from collision_monitor._jit.prefetch import prefetch
-from collision_monitor.impact.body_impact import Window, body_impact, tube_of
+from collision_monitor.impact.body_impact import Window, tube_of
 from collision_monitor.impact.coarse_impact import coarse_impact, has_bounds, may_meet
 from collision_monitor.impact.impact_record import BOUND_ONLY, CLEAR, UNRESOLVED, write_pair
+from collision_monitor.impact.piecewise_impact import body_impact
 from collision_monitor.impact.sphere_interval import meeting_of_spheres, relative_motion_at, sphere_interval
 from collision_monitor.impact.tree_impact import SearchEnd
 from collision_monitor.motion.motion import half_acceleration

@@ -13,10 +13,11 @@ from collision_monitor._jit.direct import direct
 from collision_monitor._jit.prefetch import prefetch
 from collision_monitor.errors import InputError
 from collision_monitor.impact.body_contact import RESULT, body_contact
-from collision_monitor.impact.body_impact import Scratch, Window, body_impact
+from collision_monitor.impact.body_impact import Scratch, Window
 from collision_monitor.impact.coarse_impact import coarse_impact, has_bounds
 from collision_monitor.impact.impact_record import BOUND_ONLY, CLEAR, HIT, IMPACT, holds, ids_of_keys, pair_key
 from collision_monitor.impact.pair_impacts import cover_of
+from collision_monitor.impact.piecewise_impact import body_impact
 from collision_monitor.monitor.candidates import is_checked
 from collision_monitor.monitor.contacts.carried_contacts import (
     CARRIED,

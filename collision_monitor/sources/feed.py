@@ -18,6 +18,7 @@ from collision_monitor.monitor.state.timeline import Progress
 from collision_monitor.pipeline.topics import Topic
 from collision_monitor.sources.failures import MOST_KEPT_FAILURES, SourceFailure, source_failure
 from collision_monitor.sources.ground.frames import LONGEST_FRAME_NAME, checked_poses, frame_name
+from collision_monitor.sources.ground.given_stamps import given_stamp, stream_of
 from collision_monitor.sources.ground.mapping import HEADER, Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.silent_topics import SilentTopics
@@ -27,7 +28,6 @@ from collision_monitor.sources.ground.source_time import MAX_TIME_STEP, MessageS
 from collision_monitor.sources.ground.unmonitored import Unmonitored
 from collision_monitor.sources.ground.waiting_states import Step
 from collision_monitor.sources.kinds import BY_TYPE, SECTIONS
-from collision_monitor.sources.messages.marker_arrays import MarkerArrays
 from collision_monitor.sources.messages.static_objects import StandingObjects
 from collision_monitor.sources.messages.tf_objects import FrameSource
 from collision_monitor.sources.messages.transform_arrays import TRANSFORMS, TransformArrays
@@ -337,10 +337,10 @@ class Feed:
         return progress is not Progress.REFUSED
 
     def _take(self, raw: RawMessage, content: Any, sources: list[Source]) -> Iterator[Input]:
-        given = _given_stamp(content)
+        given = given_stamp(content)
         if given is not None:
             stamp = self._time.message_stamp(given, raw.received)
-            if self._advances(raw, _stream(raw.topic, content), stamp):
+            if self._advances(raw, stream_of(raw.topic, content), stamp):
                 yield from self._step(raw, content, sources, stamp)
             return
         self._give(raw.topic, content, sources, self._time.now_or(raw.received))
@@ -436,24 +436,3 @@ class Feed:
         covariance = None if step.covariance is None else step.covariance.ravel()
         data = encode_states(step.stamp_ns, self.mapping.frame, 0, step.states, covariance)
         return Input(Topic.STATES, data, received, step.stamp_ns)
-
-
-def _given_stamp(content: Any) -> int | None:
-    """Return the stamp of a message (ns), 0 if it is left out; None for a message without a header.
-
-    That of markers is the first that is there.
-    """
-    if isinstance(content, MarkerArrays):
-        return next((each for each in content.stamps if each), 0) if content.stamps else None
-    header = getattr(content, "header", None)
-    return None if header is None else int(header.stamp.sec) * 1_000_000_000 + int(header.stamp.nanosec)
-
-
-def _stream(topic: str, content: Any) -> Hashable:
-    """Return what has rising stamps: the publishers of a topic have their own frames, joints or markers."""
-    if isinstance(content, MarkerArrays):
-        return topic, content.namespaces[0][:LONGEST_FRAME_NAME], content.ids[0]
-    names = getattr(content, "name", None)
-    if isinstance(names, list):  # joint states
-        return topic, names[0][:LONGEST_FRAME_NAME] if names else ""
-    return topic, content.header.frame_id[:LONGEST_FRAME_NAME]
