@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
 import numpy as np
 import pytest
 from rcl_interfaces.srv import SetParameters
@@ -54,6 +57,22 @@ def describe(team) -> None:
     team.meet()
     team.describe(ObjectDescription(1, Box((1, 1, 1)), name="cart"), ObjectDescription(2, Sphere(0.5), name="person_1"))
     team.status(lambda s: s.objects == 2)
+
+
+def test_the_first_rules_of_a_running_node_do_not_silence_it(start, team):
+    """Their kernels are loaded at its start: with the first rules, that took 3 s of the processor."""
+    process = start("run")
+    describe(team)
+    began = processor_time(process.pid)
+    assert set_rules(team, RULES).successful
+    assert processor_time(process.pid) - began < 1.0
+    assert process.stop() == 0
+
+
+def processor_time(pid: int) -> float:
+    """s that the threads of a process have used."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def test_alerts_are_published_changed_at_run_time_recorded_and_replayed(start, team, alerts, tmp_path):

@@ -64,8 +64,9 @@ class MonitorNode(Managed, Node):
             warm_up.warm_up_monitor(self._profile)
             if self._rules.rules:
                 warm_up.warm_up_alerts()
-        with stop.ending(), compiling_nothing():
-            warm_up.warm_up_monitor()
+        for load in (warm_up.warm_up_monitor, warm_up.warm_up_alerts):
+            with stop.ending(), compiling_nothing():
+                load()
 
     # -- life cycle
 
