@@ -11,7 +11,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from collision_monitor.codec import Change, encode_descriptions, encode_states
+from collision_monitor.codec import Change, encode_descriptions, encode_states, encode_trajectories
 from collision_monitor.errors import InputError
 from collision_monitor.monitor.state.timeline import Progress
 from collision_monitor.pipeline.topics import Topic
@@ -51,7 +51,7 @@ Decode = Callable[[str, bytes], Any]
 
 
 class Input(NamedTuple):
-    """A message for the monitor. topic: STATES or SHAPES. Times in ns."""
+    """A message for the monitor. topic: STATES, SHAPES or TRAJECTORIES. Times in ns."""
 
     topic: Topic
     data: bytes
@@ -155,6 +155,8 @@ class Feed:
 
     def miss_topic(self, topic: str, reason: str, now_ns: int) -> None:
         """Note why nothing of a topic is monitored: no publisher, another type. A message ends that."""
+        if not all(each.awaited for each in self._by_topic.get(topic, ())):
+            return
         for line in self.lines_of(topic):
             self.scene.unmonitored.lacks(line, topic, reason, now_ns)
 
@@ -385,6 +387,9 @@ class Feed:
     def _changes(self, received: int) -> Iterator[Input]:
         if changes := self.scene.take_changes():
             yield self._descriptions(changes, received)
+        for stamp, plan in self.scene.take_plans():
+            data = encode_trajectories(stamp, self.mapping.frame, [plan])
+            yield Input(Topic.TRAJECTORIES, data, received, stamp)
 
     def _descriptions(self, changes: list[Change], received: int, *, snapshot: bool = False) -> Input:
         stamp = self._time.now_ns if self._time.has_begun else 0

@@ -109,7 +109,7 @@ def _write(
     if first is None:
         raise SessionError("expected messages of the mapped topics in the bag, got none")
     left_out = {Topic.SETTINGS}
-    left_out |= set() if feed is None else {Topic.TRAJECTORIES}
+    left_out |= set() if feed is None or "plans" in feed.mapping.sections else {Topic.TRAJECTORIES}
     left_out |= set() if pipeline.rules.text else {Topic.ALERTS}
     left_out |= set() if feed is not None else {Topic.SOURCES}
     types = {topic.of(): topic.message for topic in RECORDED if topic not in left_out}

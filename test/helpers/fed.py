@@ -9,7 +9,14 @@ import numpy as np
 from foreign_bag import STORE
 from foreign_messages import decoder
 
-from collision_monitor.codec import Change, ObjectStateArray, decode_descriptions, decode_states
+from collision_monitor.codec import (
+    Change,
+    ObjectStateArray,
+    ObjectTrajectoryArray,
+    decode_descriptions,
+    decode_states,
+    decode_trajectories,
+)
 from collision_monitor.pipeline.topics import Topic
 from collision_monitor.records import StateFlag
 from collision_monitor.shapes.pose import rotation_matrix
@@ -27,7 +34,7 @@ def in_world(rows: Any) -> Any:
 
 
 class Fed:
-    """Feeds messages (topic, received, (type, message)). steps: the state arrays; changes: the descriptions."""
+    """Feeds messages (topic, received, (type, message)). steps: the state arrays; changes: the descriptions; plans."""
 
     def __init__(
         self, objects: dict[str, Any] | None = None, *, begin: int = 0, allowance: int | None = None, **top: Any
@@ -36,6 +43,7 @@ class Fed:
         self.feed = Feed(make_mapping(content), decoder(), allowance=allowance)
         self.steps: list[ObjectStateArray] = []
         self.changes: list[Change] = []
+        self.plans: list[ObjectTrajectoryArray] = []
         self._bound: set[str] = set()
         self._keep(self.feed.begin(begin))
 
@@ -55,6 +63,8 @@ class Fed:
         for each in inputs:
             if each.topic is Topic.STATES:
                 self.steps.append(decode_states(each.data))
+            elif each.topic is Topic.TRAJECTORIES:
+                self.plans.append(decode_trajectories(each.data))
             else:
                 message = decode_descriptions(each.data)
                 assert not message.refused

@@ -156,6 +156,8 @@ class Monitoring:
         def take(given: Input) -> None:
             if given.topic is Topic.STATES:
                 self._take_step(ReceivedStates.decode(given.data))
+            elif given.topic is Topic.TRAJECTORIES:
+                self._on_trajectories(given.data)
             else:
                 self._on_shapes(given.data)
 

@@ -9,7 +9,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.codec import Change, Removal
+from collision_monitor.codec import Change, ObjectTrajectory, Removal
 from collision_monitor.errors import InputError, reason_of
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.shapes.pose import Pose
@@ -75,6 +75,7 @@ class SourceScene:
         self.preparation: Any = None
         self._described: dict[int, ObjectDescription] = {}
         self._changes: list[Change] = []
+        self._plans: list[tuple[int, ObjectTrajectory]] = []
         self._taken_ids = frozenset(taken_ids)
         self._next_id = 1 + max((each for each in taken_ids if each < 1 << 31), default=0)
 
@@ -135,6 +136,10 @@ class SourceScene:
             names = [name if name in self.states else _FURTHER for name in names]
         self.states.update(names)
         self.waiting.put(states, stamp_ns, covariance, window, turns=turns)
+
+    def follow(self, plan: ObjectTrajectory, stamp_ns: int) -> None:
+        """Give an object its plan, whose time 0 is a stamp, in the monitor's frame; one without poses ends it."""
+        self._plans.append((stamp_ns, plan))
 
     def locate(self, name: str, frame: str, stamp_ns: int) -> FrameMotion | None:
         """Return pose and twist of a frame in the monitor's frame; None, after a refusal, if tf does not say.
@@ -200,6 +205,11 @@ class SourceScene:
         """Return the descriptions and removals since the last call, in order."""
         changes, self._changes = self._changes, []
         return changes
+
+    def take_plans(self) -> list[tuple[int, ObjectTrajectory]]:
+        """Return the plans since the last call, with their stamps (ns), in order."""
+        plans, self._plans = self._plans, []
+        return plans
 
     def take_news(self) -> dict[str, tuple[int, str]]:
         """Return the refusals since the last call: by name, how many, and the text of the last one."""
