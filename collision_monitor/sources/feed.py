@@ -169,6 +169,8 @@ class Feed:
 
     def miss_topic(self, topic: str, reason: str, now_ns: int) -> None:
         """Note why nothing of a topic is monitored: no publisher, another type. A message ends that."""
+        if not all(each.awaited for each in self._by_topic.get(topic, ())):
+            return
         for line in self.lines_of(topic):
             self.scene.unmonitored.lacks(line, topic, reason, now_ns)
 
@@ -364,7 +366,6 @@ class Feed:
             self._settle(at)
         yield from self._changes(raw.received)
         if at is not None:
-            yield from self._plans(raw.received)
             for step in self._due(at):
                 yield from (self._states(each, raw.received) for each in (*self._bridge(step.stamp_ns), step))
 
@@ -421,8 +422,6 @@ class Feed:
     def _changes(self, received: int) -> Iterator[Input]:
         if changes := self.scene.take_changes():
             yield self._descriptions(changes, received)
-
-    def _plans(self, received: int) -> Iterator[Input]:
         for stamp, plans in self.scene.take_plans():
             data = encode_trajectories(stamp, self.mapping.frame, plans)
             yield Input(Topic.TRAJECTORIES, data, received, stamp)

@@ -111,7 +111,8 @@ def _write(
     if first is None:
         raise SessionError("expected messages of the mapped topics in the bag, got none")
     left_out = {Topic.SETTINGS}
-    left_out |= set() if feed is None or "robots" in feed.mapping.sections else {Topic.TRAJECTORIES}
+    plans = feed is not None and any(name in feed.mapping.sections for name in ("plans", "robots"))
+    left_out |= set() if plans else {Topic.TRAJECTORIES}
     left_out |= set() if pipeline.rules.text else {Topic.ALERTS}
     left_out |= set() if feed is not None else {Topic.SOURCES}
     types = {topic.of(): topic.message for topic in RECORDED if topic not in left_out}

@@ -15,6 +15,7 @@ from collision_monitor.sources.messages.footprints import FOOTPRINT, FootprintSo
 from collision_monitor.sources.messages.markers import MARKER, MARKERS, MarkerSource
 from collision_monitor.sources.messages.poses import ODOMETRY, POSE, POSE_WITH_COVARIANCE, PoseSource
 from collision_monitor.sources.messages.tf_objects import TRANSFORMS, FrameSource
+from collision_monitor.sources.plans.path_source import make_plans
 from collision_monitor.sources.robot.planning_scene import COLLISION_OBJECT, PLANNING_SCENE, planning_world
 from collision_monitor.sources.robot.robot_section import make_robots
 
@@ -37,6 +38,9 @@ BY_TYPE: Final[dict[str, Callable[[ObjectEntry, str, Mapping], Source]]] = {
 """Makes the source of an entry of `objects:` from the entry, the type of its topic, and the whole file. Raises
 InputError for an entry that does not fit the type."""
 
-SECTIONS: Final[dict[str, Callable[[Any, Mapping], list[Source]]]] = {"robots": make_robots}
+SECTIONS: Final[dict[str, Callable[[Any, Mapping], list[Source]]]] = {
+    "robots": make_robots,
+    "plans": make_plans,
+}
 """Makes the sources of a section of the file, such as `robots`, from the content of that section, checked here, and the
 rest of the file. Raises InputError. The name is also in `mapping.SECTIONS`."""

@@ -69,7 +69,7 @@ def conflicts(
     trajectories: Any,
     static: Any = (),
     horizon: float | None = None,
-    tolerance: float = 1e-7,
+    tolerance: float = 3e-8,
     separation: float = 0.0,
     iterations: int = ITERATIONS,
     most: int = 100,

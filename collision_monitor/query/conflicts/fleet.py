@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import InputError, UnsupportedError
-from collision_monitor.motion.stated_motion import Motion
+from collision_monitor.motion.stated_motion import NUMBERS, Motion
 from collision_monitor.motion.trajectory import Trajectory, known_until
 from collision_monitor.query.body import QueryBody
 from collision_monitor.query.contact.contact import check_kinds
@@ -69,8 +69,9 @@ class PlannedFleet:
             far = reach([(shape, motion.pose @ at) for shape, at in body.pieces], _AXES)
             low, high = -far[3:], far[:3]
             is_bounded = np.isfinite(low) & np.isfinite(high)
-            boxes[0, k] = np.where(is_bounded, 0.5 * (low + high), 0.0)
-            boxes[1, k] = np.where(is_bounded, 0.5 * (high - low), inf)
+            boxes[0, k, is_bounded] = 0.5 * (low[is_bounded] + high[is_bounded])
+            boxes[1, k] = inf
+            boxes[1, k, is_bounded] = 0.5 * (high[is_bounded] - low[is_bounded])
         return boxes[0], boxes[1]
 
 
@@ -129,7 +130,7 @@ def _placed(given: Any, name: Name) -> tuple[Compound, Motion]:
 
 
 def _pieces(bodies: Sequence[QueryBody], motions: Sequence[Motion | Trajectory]) -> FleetPieces:
-    numbers, begins, tubes = [], [], []
+    numbers, begins, tubes = [np.zeros((0, NUMBERS))], [np.zeros(0)], [np.zeros(0)]
     for each in motions:
         if isinstance(each, Trajectory):
             numbers.append(each.numbers)
@@ -139,7 +140,7 @@ def _pieces(bodies: Sequence[QueryBody], motions: Sequence[Motion | Trajectory])
             numbers.append(np.array([[*each.pose.numbers, *each.numbers]]))
             begins.append(np.zeros(1))
             tubes.append(np.zeros(1))
-    counts = [len(each) for each in begins]
+    counts = [len(each) for each in begins[1:]]
     return FleetPieces(
         np.concatenate(numbers),
         np.concatenate(begins),

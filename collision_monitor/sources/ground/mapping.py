@@ -27,7 +27,7 @@ from collision_monitor.sources.ground.yaml_table import number, table, text
 
 HEADER, RECEIVED = "header", "received"
 
-SECTIONS: Final = ("robots",)
+SECTIONS: Final[tuple[str, ...]] = ("robots", "plans")
 """Sections with sources of their own; `kinds.SECTIONS` reads them."""
 
 _TOP: Final = ("frame", "stamps", "rate", "step", "max_age", "objects", *SECTIONS)

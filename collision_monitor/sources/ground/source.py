@@ -28,12 +28,14 @@ class RawMessage(NamedTuple):
 class Source:
     """Converts the messages of its topics. name: the line of the file. topics: the types that each topic may carry.
 
-    speaks: whether its topics carry a message again and again, so that silence means that the sensor failed.
+    speaks: whether its topics carry a message again and again, so that silence means that the sensor failed. awaited:
+    whether something is not monitored while there is no message.
     """
 
     name: str
     topics: Mapping[str, tuple[str, ...]]
     speaks = True
+    awaited = True
 
     def begin(self, scene: SourceScene) -> None:
         """Describe what is known before the first message. Called once. Raises InputError, SessionError."""

@@ -1,0 +1,1 @@
+"""Plans that other programs publish, as plans of the objects of a sources file."""

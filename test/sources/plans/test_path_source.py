@@ -1,0 +1,185 @@
+"""Plans of other programs: paths and trajectories become ObjectTrajectoryArrays, live and imported alike."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from fed import Fed
+from foreign_bag import SECOND, START, STORE, T, header, odometry, pose, transforms, write_bag
+from foreign_messages import decoder
+from rosbags.typesys import get_types_from_msg
+
+from collision_monitor.codec import decode_predictions, decode_trajectories
+from collision_monitor.errors import InputError
+from collision_monitor.session import Session
+from collision_monitor.session.replaying.replay import replay
+from collision_monitor.session.replaying.replay_report import Verdict
+from collision_monitor.sources import import_bag, load_mapping
+
+PATH, TRAJECTORY = "nav_msgs/msg/Path", "autoware_planning_msgs/msg/Trajectory"
+ROBOT = {"robot": {"topic": "/odom", "shape": {"box": [0.4, 0.4, 0.4]}}}
+CORNER = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 0), (1, 3, 0)]
+POINT = """\
+builtin_interfaces/Duration time_from_start
+geometry_msgs/Pose pose
+float32 longitudinal_velocity_mps
+float32 lateral_velocity_mps
+float32 acceleration_mps2
+float32 heading_rate_rps
+float32 front_wheel_angle_rad
+float32 rear_wheel_angle_rad
+"""
+DEFINITION = (
+    f"std_msgs/Header header\nautoware_planning_msgs/TrajectoryPoint[] points\n{'=' * 80}\n"
+    f"MSG: autoware_planning_msgs/TrajectoryPoint\n{POINT}"
+)
+
+
+def path(points: Any, stamps: Any = None, frame: str = "map", stamp: int = START) -> tuple[str, Any]:
+    stamps = [0] * len(points) if stamps is None else stamps
+    kind = T["geometry_msgs/msg/PoseStamped"]
+    return PATH, T[PATH](
+        header(frame, stamp), [kind(header(frame, t), pose(p)) for p, t in zip(points, stamps, strict=True)]
+    )
+
+
+def trajectory(points: Any, speeds: Any, times: Any = None) -> tuple[str, Any]:
+    if TRAJECTORY not in T:
+        STORE.register(get_types_from_msg(DEFINITION, TRAJECTORY))
+        decoder().define(TRAJECTORY, DEFINITION)
+    point, duration = T["autoware_planning_msgs/msg/TrajectoryPoint"], T["builtin_interfaces/msg/Duration"]
+    rows = [
+        point(duration(int(t), round(t % 1 * 1e9)), pose(p), v, 0.0, 0.0, 0.0, 0.0, 0.0)
+        for p, v, t in zip(points, speeds, times or [0.0] * len(points), strict=True)
+    ]
+    return TRAJECTORY, T[TRAJECTORY](header("map", START), rows)
+
+
+def fed(**plan: Any) -> Fed:
+    return Fed(ROBOT, plans={"robot": {"topic": "/plan", **plan}})
+
+
+def test_a_path_without_stamps_takes_its_speed_and_loses_equal_points() -> None:
+    given = fed(speed=0.5, headings="path", tolerance={"across": 0.3})
+    given.give("/plan", START, path(CORNER))
+    (message,) = given.plans
+    (plan,) = message.trajectories
+    assert (message.stamp_ns, message.frame_id, plan.object_id) == (START, "map", 1)
+    assert plan.times.tolist() == [0.0, 2.0, 4.0, 8.0]
+    assert plan.poses[:, :3].tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0], [1, 3, 0]]
+    yaw = 2.0 * np.arctan2(plan.poses[:, 5], plan.poses[:, 6])
+    assert yaw == pytest.approx([0.0, np.pi / 2, np.pi / 2, np.pi / 2])
+    assert plan.tolerance.tolist() == [0.3, 0.2, 0.1, 0.2]
+    assert not given.refused
+
+
+def test_stamps_that_rise_are_the_times() -> None:
+    given = fed(speed=9.0)
+    given.give("/plan", START, path(CORNER[:3], [START + k * SECOND for k in (1, 3, 4)]))
+    assert given.plans[0].trajectories[0].times.tolist() == [1.0, 3.0, 4.0]
+
+
+def test_an_empty_path_ends_the_plan() -> None:
+    given = fed(speed=1.0)
+    given.give("/plan", START, path([]))
+    assert len(given.plans[0].trajectories[0].times) == 0
+
+
+def test_a_plan_in_another_frame_is_brought_into_that_of_the_monitor() -> None:
+    given = fed(speed=1.0)
+    quarter = (0, 0, 0.5**0.5, 0.5**0.5)
+    given.give("/tf", START, transforms(START, ("map", "odom", (10, 0, 0), quarter)))
+    given.give("/plan", START, path([(0, 0, 0), (2, 0, 0)], frame="odom"))
+    poses = given.plans[0].trajectories[0].poses
+    assert poses[:, :3] == pytest.approx(np.array([[10, 0, 0], [10, 2, 0]]))
+    assert poses[0, 3:] == pytest.approx(quarter)
+
+
+@pytest.mark.parametrize(
+    ("message", "plan", "text"),
+    [
+        (path(CORNER), {}, "they are all equal, so the plan has no times; give its `speed`"),
+        (
+            path(CORNER[:3], [1, 3, 2]),
+            {"speed": 1.0},
+            "or equal ones, got a fall or a stop at pose 2",
+        ),
+        (path(CORNER[:1]), {"speed": 1.0}, "expected 2 to 20000 poses, or none to end the plan, got 1"),
+        (path([(1, 1, 0)] * 3), {"speed": 1.0}, "expected at least 2 poses at different places and times, got one"),
+        (path(CORNER, frame="nowhere"), {"speed": 1.0}, "nowhere"),
+    ],
+)
+def test_a_plan_that_cannot_be_used_is_refused_and_counted(message: Any, plan: Any, text: str) -> None:
+    given = fed(**plan)
+    given.give("/plan", START, message)
+    assert given.plans == []
+    ((found, count),) = given.refused.items()
+    assert text in found and count == 1
+
+
+def test_a_trajectory_takes_its_times_or_else_its_velocities_until_it_stands() -> None:
+    given = fed()
+    line = [(float(k), 0, 0) for k in range(4)]
+    given.give("/plan", START, trajectory(line, [1, 1, 1, 0], [0.0, 0.5, 1.5, 3.0]))
+    given.give("/plan", START + 1, trajectory(line, [1, 3, 1, 0]))
+    given.give("/plan", START + 2, trajectory(line, [2, 0, 0, 1]))
+    times = [message.trajectories[0].times.tolist() for message in given.plans]
+    assert times == [[0.0, 0.5, 1.5, 3.0], [0.0, 0.5, 1.0, 3.0], [0.0, 1.0]]
+
+
+@pytest.mark.parametrize(
+    ("plans", "text"),
+    [
+        ({}, "plans: expected a table"),
+        ({"robo": {"topic": "/plan"}}, "plans: 'robo' is unknown"),
+        ({"robot": {}}, "robot, topic: expected the topic of its plan"),
+        ({"robot": {"topic": "/odom"}}, "plans: expected a topic of its own for each plan, got /odom twice"),
+        ({"robot": {"topic": "/plan", "speed": 0}}, "robot, speed: expected"),
+        ({"robot": {"topic": "/plan", "then": "stop"}}, "robot, then: 'stop' is unknown"),
+        ({"robot": {"topic": "/plan", "tolerance": {"acros": 1}}}, "robot, tolerance: 'acros' is unknown"),
+    ],
+)
+def test_an_entry_that_cannot_be_used_is_refused(plans: Any, text: str) -> None:
+    with pytest.raises(InputError, match=text):
+        Fed(ROBOT, plans=plans)
+
+
+FILE = """\
+frame: map
+objects:
+  robot: {topic: /odom, shape: {box: [0.4, 0.4, 0.4]}}
+  post: {static: true, shape: {sphere: 0.2}, pose: [1, 1.2, 0]}
+plans:
+  robot: {topic: /plan, speed: 0.5, headings: path, tolerance: {angle: 3}}
+"""
+
+
+def test_a_bag_with_a_path_predicts_the_post_behind_the_bend_and_replays(tmp_path: Path) -> None:
+    still = ((0, 0, 0, 1), (0.5, 0, 0), (0, 0, 0))
+    stamps = [START + k * SECOND // 10 for k in range(20)]
+    messages = [("/odom", t, odometry("map", t, ((t - START) / SECOND * 0.5, 0, 0), *still)) for t in stamps]
+    messages.insert(5, ("/plan", stamps[4] + 1, path([(0, 0, 0), (1, 0, 0), (1, 3, 0)])))
+    bag = write_bag(tmp_path / "bag", messages)
+    (tmp_path / "sources.yaml").write_text(FILE)
+    mapping = load_mapping(tmp_path / "sources.yaml")
+    result = import_bag(bag, tmp_path / "run.mcap", mapping)
+    assert not (result.refused or result.skipped), result
+    session = Session(tmp_path / "run.mcap")
+    plans = [decode_trajectories(each.data) for each in session.messages() if each.type == "ObjectTrajectoryArray"]
+    assert [len(plan.trajectories) for plan in plans] == [1]
+    found = [
+        len(decode_predictions(each.data).predictions)
+        for each in Session(tmp_path / "run.mcap").messages()
+        if each.type == "PredictedCollisionArray"
+    ]
+    assert sum(found[:4]) == 0 and sum(found[6:]) > 8, found
+    assert replay(Session(tmp_path / "run.mcap")).verdict is Verdict.IDENTICAL
+    import_bag(bag, tmp_path / "again.mcap", mapping)
+    one, other = (
+        [each.data for each in Session(tmp_path / name).messages() if each.type != "MonitorStatus"]
+        for name in ("run.mcap", "again.mcap")
+    )
+    assert one == other
