@@ -4,21 +4,11 @@ The other metadata is in pyproject.toml. `python_requires` and `license` are her
 that setuptools gives them there, and because setuptools 68 (Ubuntu 24.04) and 77 disagree on how to write a licence.
 """
 
-import sys
 from glob import glob
 
 from setuptools import setup
 
 PACKAGE = "collision_monitor"
-
-# `ros2 run collision_monitor monitor` finds a folder of its own; on the PATH, such a name could be anything.
-EXECUTABLES = {
-    "monitor": ("collision-monitor-node", "collision_monitor.ros.executables:monitor"),
-    "guard": ("collision-monitor-guard", "collision_monitor.ros.executables:guard"),
-    "world": ("collision-monitor-world", "collision_monitor.ros.executables:world"),
-    "replay": ("collision-monitor-replay", "collision_monitor.cli.main:replay_main"),
-}
-FOR_ROS = not {"install", "develop"}.isdisjoint(sys.argv)  # colcon and Debian's builds; pip calls neither of them
 
 setup(
     python_requires=">=3.11",
@@ -32,7 +22,10 @@ setup(
     entry_points={
         "console_scripts": [
             "collision-monitor = collision_monitor.cli.main:main",
-            *(f"{name if FOR_ROS else longer} = {place}" for name, (longer, place) in EXECUTABLES.items()),
+            "monitor = collision_monitor.ros.executables:monitor",
+            "guard = collision_monitor.ros.executables:guard",
+            "world = collision_monitor.ros.executables:world",
+            "replay = collision_monitor.cli.main:replay_main",
         ],
         "pytest11": ["collision_monitor = collision_monitor.session.pytest_plugin"],
     },

@@ -205,12 +205,7 @@ def _build_messages(ros: machine.RosInstall | None, log: IO[str]) -> None:
 # package -------------------------------------------------------------------------------------------------------------
 
 
-EXECUTABLES = {
-    **{name: f"collision-monitor-{name}" for name in ("guard", "world", "replay")},
-    "monitor": "collision-monitor-node",
-    "collision-monitor": "collision-monitor",
-}
-"""Names for `ros2 run`, and those that pip puts on the PATH (setup.py)."""
+EXECUTABLES = ("monitor", "guard", "world", "replay", "collision-monitor")
 
 
 def ros_files() -> dict[Path, Path]:
@@ -223,7 +218,7 @@ def ros_files() -> dict[Path, Path]:
     return {
         share / "ament_index" / "resource_index" / "packages" / PACKAGE: ROOT / "resource" / PACKAGE,
         **{share / PACKAGE / path.relative_to(ROOT): path for path in data},
-        **{VENV / "lib" / PACKAGE / name: VENV / "bin" / longer for name, longer in EXECUTABLES.items()},
+        **{VENV / "lib" / PACKAGE / name: VENV / "bin" / name for name in EXECUTABLES},
     }
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -49,13 +48,7 @@ def test_the_wheel_works_without_ros(tmp_path: Path) -> None:
     (wheel,) = tmp_path.glob("*.whl")
     with zipfile.ZipFile(wheel) as content:
         names = content.namelist()
-        scripts = content.read(next(name for name in names if name.endswith("entry_points.txt"))).decode()
         content.extractall(target)
-    on_the_path = re.findall(r"^([\w-]+) = ", scripts.partition("[console_scripts]")[2].partition("[")[0], re.MULTILINE)
-    assert sorted(on_the_path) == [
-        "collision-monitor",
-        *(f"collision-monitor-{name}" for name in ("guard", "node", "replay", "world")),
-    ]
     for needed in ("py.typed", "session/mcap/definitions.txt", "ros/shared_memory.xml", "_jit/libraries.py"):
         assert f"collision_monitor/{needed}" in names
     # without compilation: kernels in another place would be compiled anew, for a minute
