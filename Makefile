@@ -33,12 +33,12 @@ demo: setup-demo ## play a scene and show the monitor's answers, live in this te
 interfaces: setup ## build the message packages that the wheels lack: tf2, vision, autoware, moveit
 	@$(BIN)/python scripts/set_up/interfaces.py
 
-# The tests of the node mostly wait, and the others compute: side by side, those that compute leave the cores to the rest.
 test: interfaces ## set up, lint and run every test
-	@$(MAKE) --no-print-directory -j3 NICE="nice -n 10" test-ros lint test-core
+	@$(MAKE) --no-print-directory -j2 lint test-core
+	@$(MAKE) --no-print-directory test-ros
 
 test-core: setup ## run the tests, except those of the node and of the set-up
-	@$(NICE) $(BIN)/python -m pytest -n auto --dist worksteal --ignore=test/ros --ignore=test/setup
+	@$(BIN)/python -m pytest -n auto --dist worksteal --ignore=test/ros --ignore=test/setup
 
 test-ros: interfaces ## run the tests of the node and of the set-up
 	@env -u MAKEFLAGS $(BIN)/python -m pytest -n 3 --dist worksteal test/ros test/setup  # they call make themselves
@@ -58,7 +58,7 @@ coverage: setup ## run test-core, and write which lines of Python it runs into b
 
 lint: setup ## run ruff, mypy --strict and codespell
 	@$(BIN)/ruff check .
-	@$(NICE) $(BIN)/mypy
+	@$(BIN)/mypy
 	@$(BIN)/codespell
 
 CHANGED = { git diff --name-only --diff-filter=d HEAD; git ls-files --others --exclude-standard; } | grep '\.py$$'

@@ -7,6 +7,8 @@ missed if they meet and nothing is predicted; late if contact comes before the p
     python benchmarks/motion_models.py                    2,000 encounters of each kind, 3 minutes
     python benchmarks/motion_models.py --quick            200 of each, half a minute
     python benchmarks/motion_models.py --png docs/images/motion_models.png
+
+arm_models.py has the rows of an arm of seven joints, whose truth takes longer.
 """
 
 from __future__ import annotations

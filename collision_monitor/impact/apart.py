@@ -6,11 +6,41 @@ from typing import Any, NamedTuple
 
 from collision_monitor._jit import inlined, outlined
 from collision_monitor.geometry.vector import Vector, opposite
+from collision_monitor.impact.mesh_pair import has_mesh
+from collision_monitor.motion.bodies import next_pair
 from collision_monitor.motion.motion import acceleration_within, most_turning, position_at
+from collision_monitor.motion.placed_pair import place_pair
+from collision_monitor.narrow_phase.dispatch import separation
 
 
 @outlined
-def apart_until(
+def clear_until(
+    multibody: Any, pair: Any, window: tuple[float, float], least: float, tube: Any, scratch: Any
+) -> tuple[float, int]:  # fmt: skip
+    """Time until which two bodies (BodyPair), one of which follows a plan, are farther apart than `least` (m).
+
+    By one distance for each pair of shapes: along its normal, whole pieces bring them nearer by no more than the gap.
+    window: the times to search (s). tube: of both from its begin on. Returns that time, the begin of a piece or the
+    window's end, and the number of distance queries. Of meshes it knows nothing.
+    """
+    table, parts, bodies = multibody
+    A, B, a, first_b, spin_a, spin_b = pair
+    begin, until = window
+    b, queries = first_b, 0
+    while a >= 0 and until > begin:
+        if has_mesh(table, a, b):
+            return begin, queries
+        placed = place_pair(table, parts, (A, B, a, b), begin, scratch)
+        gap = separation(table, a, b, placed.pose, scratch.out, scratch.work) - least - tube.start
+        n = (scratch.out[0], scratch.out[1], scratch.out[2])
+        until = _apart_until(bodies.pieces, A, B, n, (spin_a, spin_b), gap, tube.growth, begin, until)
+        queries += 1
+        a, b = next_pair(parts, first_b, a, b)
+    return until, queries
+
+
+@outlined
+def _apart_until(
     pieces: Any, A: Any, B: Any, n: Vector, radii: tuple[float, float], gap: float, growth: float, begin: float,
     end: float,
 ) -> float:  # fmt: skip

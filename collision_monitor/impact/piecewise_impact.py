@@ -5,23 +5,18 @@ from __future__ import annotations
 from math import inf
 from typing import Any
 
-from collision_monitor._jit import device, outlined
-from collision_monitor.impact.apart import apart_until
+from collision_monitor._jit import device
+from collision_monitor.impact.apart import clear_until
 from collision_monitor.impact.body_impact import (
     BodyPair,
     ImpactQuery,
     Scratch,
-    ShapePair,
     Window,
     chains_impact,
     tube_of,
 )
 from collision_monitor.impact.impact_record import CLEAR, HIT, UNRESOLVED, write_pair
-from collision_monitor.impact.mesh_pair import has_mesh
-from collision_monitor.motion.bodies import next_pair
 from collision_monitor.motion.motion import set_piece
-from collision_monitor.motion.placed_pair import place_pair
-from collision_monitor.narrow_phase.dispatch import separation
 
 
 @device
@@ -50,7 +45,8 @@ def body_impact(
             _set_piece_at(bodies, j, begin, B)
         pair = BodyPair(A, B, a, b, spin_a, spin_b)
         if min(A.until, B.until) < end and not is_near:
-            apart, n = _clear_until(multibody, pair, Window(begin, end), query, scratch)
+            least, tube = query.margin + query.tolerance, tube_of(A, B, begin)
+            apart, n = clear_until(multibody, pair, (begin, end), least, tube, scratch)
             queries, is_near, begin = queries + n, apart == begin, apart
             if begin >= end:
                 event.status = CLEAR
@@ -70,31 +66,6 @@ def body_impact(
     if event.status != CLEAR:
         write_pair(bodies, i, j, event)
     return queries
-
-
-@outlined
-def _clear_until(
-    multibody: Any, pair: BodyPair, window: Window, query: ImpactQuery, scratch: Scratch
-) -> tuple[float, int]:  # fmt: skip
-    """Time until which two bodies, one of which follows a plan, are certainly apart, by one distance for each shape.
-
-    Along the normal of that distance, whole pieces bring them nearer by no more than the gap. Returns that time, the
-    begin of a piece or the window's end, and the number of distance queries. Of meshes it knows nothing.
-    """
-    table, parts, bodies = multibody
-    A, B, a, first_b, spin_a, spin_b = pair
-    begin, until = window
-    b, queries, tube = first_b, 0, tube_of(A, B, begin)
-    while a >= 0 and until > begin:
-        if has_mesh(table, a, b):
-            return begin, queries
-        placed = place_pair(table, parts, ShapePair(A, B, a, b), begin, scratch)
-        gap = separation(table, a, b, placed.pose, scratch.out, scratch.work) - query.margin - query.tolerance
-        n = (scratch.out[0], scratch.out[1], scratch.out[2])
-        until = apart_until(bodies.pieces, A, B, n, (spin_a, spin_b), gap - tube.start, tube.growth, begin, until)
-        queries += 1
-        a, b = next_pair(parts, first_b, a, b)
-    return until, queries
 
 
 @device
