@@ -213,4 +213,4 @@ def test_kernels_do_not_repeat_large_functions(warmed: None) -> None:
     """With the time of impact in each of ten kernels, all kernels had five times as many instructions."""
     done = subprocess.run([sys.executable, "-c", VOLUME], check=True, capture_output=True, text=True)
     functions, size = json.loads(done.stdout)
-    assert functions < 120 and size < 14_000_000
+    assert functions < 140 and size < 14_000_000

@@ -10,7 +10,7 @@ import sys
 import tempfile
 from types import TracebackType
 
-from collision_monitor.errors import CollisionMonitorError
+from collision_monitor.errors import CollisionMonitorError, one_line
 
 LINES = 8
 """Last lines of the process's output that an error shows."""
@@ -31,6 +31,9 @@ def _end_with_parent() -> None:
 
 class ProcessError(CollisionMonitorError):
     """A process failed. The text ends with the last lines of its output."""
+
+    def __str__(self) -> str:
+        return "\n".join(map(one_line, str(self.args[0]).split("\n")))
 
 
 class Child:

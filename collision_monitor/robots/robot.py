@@ -158,7 +158,7 @@ class Robot:
         >>> arm = Robot("examples/arm/arm.urdf")
         >>> moves = arm.motions([0, 0.2, 0, -2, 0, 2.2, 0.8, 0.03], [0.5, 0, 0, 0.3, 0, 0, 0, 0], horizon=2.0)
         >>> moves["hand"].at(1.0).position.round(3)
-        array([0.36 , 0.196, 0.634])
+        array([0.57 , 0.311, 0.504])
         """
         joints, wanted = joint_values(self.joints, q, qd), Wanted(self.rows, self.radii)
         made = planned_links(self.tree, wanted, joints, base, horizon, tolerance, then)

@@ -363,9 +363,13 @@ class Feed:
         self._give(raw.topic, content, sources, stamp.ns)
         at = self._time.step_due(raw.topic, stamp.ns)
         if at is not None:
+            if len(self._silence_until(at)) > MOST_BRIDGED:
+                for source in self._sources:
+                    source.forget_plans()
             self._settle(at)
         yield from self._changes(raw.received)
         if at is not None:
+            yield from self._plans(raw.received)
             for step in self._due(at):
                 yield from (self._states(each, raw.received) for each in (*self._bridge(step.stamp_ns), step))
 
@@ -413,15 +417,21 @@ class Feed:
 
         A silence that is longer than MOST_BRIDGED steps is one: the monitor begins anew behind it.
         """
-        last = self._stepped
+        between, last = self._silence_until(stamp), self._stepped
         self._stepped = stamp if last is None else max(last, stamp)
-        between = range(stamp if last is None else last + _LONGEST_STEP, stamp, _LONGEST_STEP)
         for each in between if len(between) <= MOST_BRIDGED else (stamp - 1,):
             yield Step(each, np.zeros(0, records.STATE), None)
+
+    def _silence_until(self, stamp: int) -> range:
+        """Stamps of the steps without states that a silence until a stamp needs."""
+        last = self._stepped
+        return range(stamp if last is None else last + _LONGEST_STEP, stamp, _LONGEST_STEP)
 
     def _changes(self, received: int) -> Iterator[Input]:
         if changes := self.scene.take_changes():
             yield self._descriptions(changes, received)
+
+    def _plans(self, received: int) -> Iterator[Input]:
         for stamp, plans in self.scene.take_plans():
             data = encode_trajectories(stamp, self.mapping.frame, plans)
             yield Input(Topic.TRAJECTORIES, data, received, stamp)

@@ -39,7 +39,7 @@ from rosbags.typesys import Stores, get_typestore  # noqa: E402
 
 from collision_monitor.alerts.rules import Rules  # noqa: E402
 from collision_monitor.errors import CollisionMonitorError  # noqa: E402
-from collision_monitor.robots.robot import Description, make_robot  # noqa: E402
+from collision_monitor.robots.robot import Description, Robot  # noqa: E402
 from collision_monitor.settings.profile import Profile  # noqa: E402
 from collision_monitor.shapes.mesh_file import load_mesh  # noqa: E402
 from collision_monitor.sources.bag import Bag  # noqa: E402
@@ -278,8 +278,8 @@ def _read_mesh(path: Path) -> str:
 def _read_robot(path: Path) -> str:
     arm = ROOT / "examples/arm/arm.urdf"
     given = Description.read(path)
-    robot = make_robot(Description.read(arm), given) if path.suffix == ".srdf" else make_robot(given)
-    poses, twists = robot.motions(np.zeros((len(robot.tree.joints), 2)), np.eye(1, 13, 6)[0])
+    robot = Robot(Description.read(arm), given) if path.suffix == ".srdf" else Robot(given)
+    poses, twists = robot.states(np.zeros((len(robot.tree.joints), 2)), np.eye(1, 13, 6)[0])
     if not (np.isfinite(poses).all() and np.isfinite(twists).all()):
         raise AssertionError("poses that are no numbers")
     return f"read{', parts left out' * bool(robot.left_out)}"

@@ -109,6 +109,12 @@ def _impact(g: np.random.Generator) -> Any:
     return found.status, found.lower, found.upper
 
 
+def _conflicts(g: np.random.Generator) -> Any:
+    """The conflicts of eight objects that go straight through each other's ways."""
+    found = cm.conflicts([shapes(g)[k] for k in range(4)] * 2, [motion(g) for _ in range(8)], horizon=3.0)
+    return np.array([(*each.entry, *each.exit) for each in found])
+
+
 def _intervals(g: np.random.Generator) -> Any:
     a, b = two(g)
     return [(*each.entry, *each.exit) for each in cm.impacts(a, motion(g), b, solid_motion(b, g))]
@@ -236,6 +242,7 @@ CALLS: dict[str, Call] = {
     "time_of_impact_batch": _batch,
     "times_of_impact": _times,
     "impacts": _intervals,
+    "conflicts": _conflicts,
     "contains": lambda g: cm.contains(shapes(g)[g.integers(8)], pose(g), g.normal(size=(30, 3))),
     "cast_ray": lambda g: cm.cast_ray(shapes(g)[g.integers(8)], pose(g), *_vectors(g, 2)).distance,
     "points_within": lambda g: cm.points_within(shapes(g)[8], pose(g), shapes(g)[g.integers(8)], pose(g), 0.3),

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,13 +14,19 @@ from numpy.typing import ArrayLike
 from collision_monitor.checks.numbers import checked_array
 from collision_monitor.errors import InputError
 from collision_monitor.geometry.coordinates import Array, coordinates
-from collision_monitor.tolerances import EPSILON
+
+SMALLEST: Final = 2.0**-970
+"""m²: smaller squares may have lost digits."""
+
+CERTAIN: Final = 2.0**-8
+"""Part of the sum of all squares from which on round-off changes a value by less than 1e-12 of it."""
 
 
 def implicit_circle(p: ArrayLike, center: ArrayLike, radius: ArrayLike) -> Array:
     """f(p) = |p - center|² - radius² in m², for points (..., 2 or 3) of a circle or a sphere.
 
-    Positive outside, 0 on the boundary, negative inside; the sign is exact for the numbers given. Raises InputError.
+    Positive outside, 0 on the boundary, negative inside. The sign is exact for the numbers given, and the value is
+    right within 1e-12 of it. Raises InputError.
     """
     p, center, radius = _circle(p, center, radius)
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):
@@ -27,8 +34,8 @@ def implicit_circle(p: ArrayLike, center: ArrayLike, radius: ArrayLike) -> Array
         parts = np.concatenate([offset**2, -(radius[..., None] ** 2)], axis=-1)
         value = np.asarray(parts.sum(axis=-1))
         # a difference, a square and the sums each lose half a unit of the last place
-        certain = np.abs(value) > 16 * EPSILON * np.abs(parts).sum(axis=-1)
-        certain &= np.isfinite(value) & (np.abs(parts) > np.finfo(np.float64).tiny / EPSILON).any(axis=-1)
+        certain = np.abs(value) > CERTAIN * np.abs(parts).sum(axis=-1)
+        certain &= np.isfinite(value) & (np.abs(parts) > SMALLEST).any(axis=-1)
     for place in map(tuple, np.argwhere(~certain)):
         exact = sum((Fraction(x) - Fraction(c)) ** 2 for x, c in zip(p[place], center[place], strict=True))
         exact -= Fraction(float(radius[place])) ** 2

@@ -58,3 +58,6 @@ class Source:
 
     def restart(self, now_ns: int, scene: SourceScene) -> None:
         """Forget all earlier times: time jumped to `now_ns`, or went back to it. Objects stay."""
+
+    def forget_plans(self) -> None:
+        """Forget which plans objects follow: the monitor begins anew with the next step, without them."""

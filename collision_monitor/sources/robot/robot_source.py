@@ -126,6 +126,10 @@ class RobotSource(Source):
         self._base.restart()
         if self.robot is not None:
             self._joints.restart()
+        self.forget_plans()
+
+    def forget_plans(self) -> None:
+        """See Source."""
         if self._plans is not None:
             self._plans.restart()
 
