@@ -143,8 +143,6 @@ def load_kernels() -> None:
         campaign = Campaign(-1 - seed)
         for index in range(100):
             campaign.attack(index, campaign.message(index))
-    gc.collect()
-    gc.freeze()  # a collection among the objects of all kernels takes longer than the limit of a message
 
 
 def is_broken_by(topic: Topic, data: bytes) -> list[str]:
@@ -178,6 +176,8 @@ class Campaign:
     def run(self, messages: int = RUN) -> Summary:
         """Send this many messages."""
         load_kernels()
+        gc.collect()
+        gc.freeze()  # a collection among the objects of kernels and of other tests takes longer than a message may
         summary, settled = self.summary, 0
         for index in range(messages):
             message = self.message(index)
