@@ -27,7 +27,8 @@ def state(position: tuple[float, float, float], linear: tuple[float, float, floa
 
 def trajectory(points: list[tuple[float, float, float]], times: list[float], object_id: int = 1) -> ObjectTrajectory:
     poses = np.array([[*point, 0, 0, 0, 1] for point in points], float).reshape(-1, 7)
-    return ObjectTrajectory(np.array(times, float), poses, np.zeros((0, 6)), np.zeros(4), object_id)
+    tolerance = np.array([0.1, 2.0, 0.1, 2.0])  # m along it and s: the states come when a busy machine sends them
+    return ObjectTrajectory(np.array(times, float), poses, np.zeros((0, 6)), tolerance, object_id)
 
 
 def test_a_robot_whose_plan_turns_into_a_post_is_predicted_to_meet_it(start: Any, team: Any, tmp_path: Path) -> None:
