@@ -37,9 +37,9 @@ from collision_monitor.uncertainty.plane_impacts import enter_bodies, enter_sure
 from collision_monitor.uncertainty.round_impacts import NOT_ROUND, enter_round_bodies, round_form
 from collision_monitor.uncertainty.sampled_impacts import (
     SAMPLE_TOLERANCE,
-    body_has_mesh,
     first_contact,
     likely_contact,
+    pair_has_mesh,
     right_time,
 )
 from collision_monitor.uncertainty.samples.error_samples import orientation_spread, set_frame, take_root
@@ -79,8 +79,7 @@ def plane_probabilities(
         if bodies.planned[i] or bodies.planned[j]:
             answers[k, EARLIEST], answers[k, MOST_LIKELY], answers[k, PROBABILITY] = 0.0, 0.0, LEFT
             continue
-        has_mesh = body_has_mesh(table, parts, bodies.first_shape[i])
-        has_mesh |= body_has_mesh(table, parts, bodies.first_shape[j])
+        has_mesh = pair_has_mesh(table, parts, bodies, i, j)
         ages = (carry_on(bodies, i, now, work.quaternion, A), carry_on(bodies, j, now, work.quaternion, B))
         r_i, r_j = swing_radius(bodies, spread, i), swing_radius(bodies, spread, j)
         now_i, growth_i = surface_spread(bodies, spread, i, r_i, ages[0], horizon, stale_acceleration)

@@ -26,8 +26,8 @@ from collision_monitor.uncertainty.sampled_impacts import (
     MESH_TOLERANCE,
     PILOT_PART,
     SAMPLE_TOLERANCE,
-    body_has_mesh,
     gap_at,
+    pair_has_mesh,
 )
 from collision_monitor.uncertainty.samples.error_samples import (
     LEFT_OVER,
@@ -239,16 +239,9 @@ def _turning(
 def _size(table: Any, parts: Any, bodies: Any, pair: Any, most: int) -> int:
     """Number of samples of a pair."""
     size = min(PILOT, most)
-    if _has_mesh(table, parts, bodies, pair):
+    if pair_has_mesh(table, parts, bodies, pair[0], pair[1]):
         return min(size, max(size // COSTLY_PARTS, FEWEST_WITH_MESH))
     return size
-
-
-@inlined
-def _has_mesh(table: Any, parts: Any, bodies: Any, pair: Any) -> bool:
-    """Whether a body of the pair has a mesh or a cloud."""
-    first = bodies.first_shape
-    return body_has_mesh(table, parts, first[pair[0]]) or body_has_mesh(table, parts, first[pair[1]])
 
 
 @device
@@ -267,7 +260,7 @@ def _follow(
         0.0 if turns_by_yaw(spread, pair[1], sampling.planar) else 1.0,
     )
     moved = 0 if bodies.planned[pair[1]] and not bodies.planned[pair[0]] else 1
-    has_mesh = _has_mesh(table, parts, bodies, pair)
+    has_mesh = pair_has_mesh(table, parts, bodies, pair[0], pair[1])
     coarse = max(query.tolerance, (MESH_TOLERANCE if has_mesh else SAMPLE_TOLERANCE) * work.joint[0, 0])
     roughly = ImpactQuery(query.margin, coarse, query.iterations)
     # half a tolerance inside, on average; the surface of a mesh has no gap below 0

@@ -211,6 +211,13 @@ def body_has_mesh(table: Any, parts: Any, shape: int) -> bool:
     return found
 
 
+@inlined
+def pair_has_mesh(table: Any, parts: Any, bodies: Any, i: int, j: int) -> bool:
+    """Whether body i or body j has a mesh or a cloud."""
+    first = bodies.first_shape
+    return body_has_mesh(table, parts, first[i]) or body_has_mesh(table, parts, first[j])
+
+
 @kernel
 def find_divisors(multibody: Any, pairs: Any, horizon: float, divisors: Any) -> None:
     """Write the number by which the samples of each pair (P, 2) are divided to divisors (P,).
@@ -222,8 +229,7 @@ def find_divisors(multibody: Any, pairs: Any, horizon: float, divisors: Any) -> 
     for k in range(len(pairs)):
         i, j = pairs[k, 0], pairs[k, 1]
         A, B = bodies.motion[i], bodies.motion[j]
-        is_costly = spins(A, B, horizon) or body_has_mesh(table, parts, bodies.first_shape[i])
-        is_costly |= body_has_mesh(table, parts, bodies.first_shape[j])
+        is_costly = spins(A, B, horizon) or pair_has_mesh(table, parts, bodies, i, j)
         divisors[k] = COSTLY_PARTS if is_costly else (SPINNING_PARTS if spins_far(A, B, horizon) else 1)
 
 
@@ -449,7 +455,7 @@ def impact_probabilities(
         tube = Tube(now_i + now_j, growth_i + growth_j)
         coarse = max(query.tolerance, SAMPLE_TOLERANCE * tube.start)
         a, b = bodies.first_shape[i], bodies.first_shape[j]
-        has_mesh = body_has_mesh(table, parts, a) or body_has_mesh(table, parts, b)
+        has_mesh = pair_has_mesh(table, parts, bodies, i, j)
         is_one_search = has_mesh and parts.next[a] < 0 and parts.next[b] < 0
         iterations = min(query.iterations, SEARCH_ITERATIONS) if is_one_search else query.iterations
         roughly, whole = ImpactQuery(query.margin, coarse, iterations), Window(0.0, horizon)

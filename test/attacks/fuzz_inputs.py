@@ -30,6 +30,7 @@ sys.path[:0] = [str(HERE), str(HERE.parent / "helpers"), str(HERE.parents[1])]
 
 import numpy as np  # noqa: E402
 from foreign_bag import START, STORE, odometry, write_bag  # noqa: E402
+from fuzz_sessions import print_problems  # noqa: E402
 from mcap.writer import CompressionType, IndexType  # noqa: E402
 from mesh_files import CUBE, CUBE_QUADS, glb, gltf_mesh, soup, stl, stl_text  # noqa: E402
 from recorded_bags import KIND, ODOM, STEP, STILL, mcap, rows  # noqa: E402
@@ -373,10 +374,7 @@ def main() -> int:
     for outcome, count in sorted(found.outcomes.items()):
         print(f"{count:9d}  {outcome}")
     print(f"slowest    {found.slowest[0]:.2f} s (seed {found.slowest[1]})")
-    for seed, problem in sorted(found.problems.items())[:50]:
-        print(f"seed {seed}: {problem}")
-    print(f"{found.files} files in {time.monotonic() - began:.0f} s, {len(found.problems)} with problems")
-    return 1 if found.problems else 0
+    return print_problems(found.files, found.problems, began)
 
 
 if __name__ == "__main__":

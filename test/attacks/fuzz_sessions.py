@@ -152,6 +152,14 @@ def run(
     return found
 
 
+def print_problems(files: int, problems: dict[int, str], began: float) -> int:
+    """Print the problems by seed, and how many files were read since `began` (s). Return the exit code."""
+    for seed, problem in sorted(problems.items())[:50]:
+        print(f"seed {seed}: {problem}")
+    print(f"{files} files in {time.monotonic() - began:.0f} s, {len(problems)} with problems")
+    return 1 if problems else 0
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--files", type=int, default=1000, metavar="N", help="number of files (default: 1000)")
@@ -181,10 +189,7 @@ def main() -> int:
         print(f"{count:9d}  {outcome}")
     print(f"slowest    {found.slowest[0]:.2f} s (seed {found.slowest[1]})")
     print(f"largest    {found.largest[0]:.0f} MiB (seed {found.largest[1]})")
-    for seed, problem in sorted(found.problems.items())[:50]:
-        print(f"seed {seed}: {problem}")
-    print(f"{found.files} files in {time.monotonic() - begin:.0f} s, {len(found.problems)} with problems")
-    return 1 if found.problems else 0
+    return print_problems(found.files, found.problems, begin)
 
 
 if __name__ == "__main__":

@@ -47,6 +47,18 @@ def cpu(work: Callable[[], Any]) -> float:
     return time.process_time() - began
 
 
+def kept_of(send: Callable[[int], None], count: int) -> int:
+    """Bytes that Python holds for the inputs 1 to count - 1, after the first one."""
+    send(0)
+    tracemalloc.start()
+    try:
+        for k in range(1, count):
+            send(k)
+        return tracemalloc.get_traced_memory()[0]
+    finally:
+        tracemalloc.stop()
+
+
 def give(fed: Fed, topic: str, received: int, kind_and_content: tuple[str, Any]) -> float:
     """Give a message, and return the seconds of the processor that it took without its making."""
     kind, content = kind_and_content
@@ -127,14 +139,7 @@ def test_long_names_are_not_kept(where: str) -> None:
         else:
             played.joints(stamp, [0.0], names=[name])
 
-    send(0)
-    tracemalloc.start()
-    try:
-        for k in range(1, 100):
-            send(k)
-        assert tracemalloc.get_traced_memory()[0] < 1_000_000  # of 9.9 MB
-    finally:
-        tracemalloc.stop()
+    assert kept_of(send, 100) < 1_000_000  # of 9.9 MB
 
 
 def test_a_loop_of_frames_and_frames_that_refer_to_themselves_end() -> None:
@@ -460,14 +465,7 @@ def test_long_names_in_a_planning_scene_are_not_kept(where: str) -> None:
         }
         played.send("/scene", SCENE, a_scene(**fields[where]))
 
-    send(0)
-    tracemalloc.start()
-    try:
-        for k in range(1, 40):
-            send(k)
-        assert tracemalloc.get_traced_memory()[0] < 1_000_000  # of 3.9 MB
-    finally:
-        tracemalloc.stop()
+    assert kept_of(send, 40) < 1_000_000  # of 3.9 MB
 
 
 def test_more_touch_links_than_a_robot_has_links_are_refused() -> None:
