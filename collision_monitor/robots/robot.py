@@ -24,6 +24,7 @@ from collision_monitor.robots.mesh_location import FileLocator
 from collision_monitor.robots.srdf import Pair, disabled_pairs
 from collision_monitor.robots.touching_links import touching_links
 from collision_monitor.robots.urdf import Urdf, parse_urdf
+from collision_monitor.robots.xacro_file import ENDING, expand_xacro
 from collision_monitor.settings.regular_file import read_regular
 from collision_monitor.settings.xml_tree import LARGEST_TEXT
 from collision_monitor.shapes.pose import Pose
@@ -52,9 +53,17 @@ class Description:
     folder: Path = Path()
 
     @classmethod
-    def read(cls, path: Path) -> Description:
-        """Read a file. Raises InputError."""
-        return cls(read_regular(path, most=LARGEST_TEXT), str(path), path.parent)
+    def read(
+        cls, path: Path, arguments: Mapping[str, str] | None = None, packages: Mapping[str, Path] | None = None
+    ) -> Description:
+        """Read a file; one that ends in .xacro as `expand_xacro` does. Raises InputError."""
+        if path.suffix == ENDING:
+            text = expand_xacro(path, arguments or {}, packages or {})
+        elif arguments:
+            raise InputError(f"{path}: expected a xacro file, which takes arguments, got another one")
+        else:
+            text = read_regular(path, most=LARGEST_TEXT)
+        return cls(text, str(path), path.parent)
 
 
 _Source = Description | str | PathLike[str]
@@ -64,7 +73,8 @@ _Source = Description | str | PathLike[str]
 class Robot:
     """A robot of a URDF, and of an SRDF if there is one: links with shapes, and how its joints move them.
 
-    urdf, srdf: paths of the files. packages: folders of ROS packages by name. A geometry that cannot be used is left
+    urdf, srdf: paths of the files. packages: folders of ROS packages by name. arguments: of a URDF that is a xacro
+    file, whose name ends in .xacro. A geometry that cannot be used is left
     out, and `problems` names it. Raises InputError if nothing is left, and for files that are no URDF or SRDF.
 
     tree: its joints. rows (S,): rows of the links with shapes in the tree. shapes: of each of these links, with their
@@ -82,9 +92,13 @@ class Robot:
     left_out: tuple[tuple[str, str], ...]
 
     def __init__(
-        self, urdf: _Source, srdf: _Source | None = None, packages: Mapping[str, Path] | None = None
-    ) -> None:  # fmt: skip
-        description = _description(urdf)
+        self,
+        urdf: _Source,
+        srdf: _Source | None = None,
+        packages: Mapping[str, Path] | None = None,
+        arguments: Mapping[str, str] | None = None,
+    ) -> None:
+        description = _description(urdf, arguments, packages)
         model = parse_urdf(description.text, description.name)
         self.tree = kinematic_tree(model)
         files = FileLocator(description.folder, packages)
@@ -170,8 +184,10 @@ class Robot:
         return np.array([radius_of(shapes) for shapes in self.shapes])
 
 
-def _description(given: _Source) -> Description:
-    return given if isinstance(given, Description) else Description.read(Path(given))
+def _description(
+    given: _Source, arguments: Mapping[str, str] | None = None, packages: Mapping[str, Path] | None = None
+) -> Description:  # fmt: skip
+    return given if isinstance(given, Description) else Description.read(Path(given), arguments, packages)
 
 
 def _disabled(

@@ -2,7 +2,8 @@
 
 robots:
   arm:
-    urdf: package://arm_description/urdf/arm.urdf    # or a path, or `urdf_topic: /robot_description`
+    urdf: package://arm_description/urdf/arm.urdf    # or a path, or `urdf_topic: /robot_description`; or a xacro file
+    arguments: {prefix: left_}                       # of a xacro file
     srdf: arm.srdf                                   # or `srdf_topic: /robot_description_semantic`; may be left out
     packages: {arm_description: ../arm}              # folders of packages that are not installed
     joint_states: /joint_states
@@ -25,12 +26,14 @@ from collision_monitor.errors import InputError
 from collision_monitor.records import Model
 from collision_monitor.robots.mesh_location import FileLocator
 from collision_monitor.robots.robot import Description
+from collision_monitor.robots.xacro_file import ENDING
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.yaml_table import known, number, pose, table, text
 
 _KEYS: Final = (
-    *("urdf", "urdf_topic", "srdf", "srdf_topic", "packages", "joint_states", "base", "planning_scene"),
+    *("urdf", "urdf_topic", "srdf", "srdf_topic", "packages", "arguments", "joint_states", "base"),
+    "planning_scene",
     *("padding", "group", "mask", "model", "allowed", "motion"),
 )
 JOINTS, ARC = "joints", "arc"
@@ -99,6 +102,10 @@ def _robot(name: str, content: dict[str, Any], mapping: Mapping) -> RobotEntry:
     if not isinstance(packages, dict):
         raise InputError(f"{name}, packages: expected a table of folders by package, got {packages!r}")
     folders = {str(key): folder / text(value, f"{name}, packages") for key, value in packages.items()}
+    arguments = content.get("arguments", {})
+    if not isinstance(arguments, dict) or (arguments and not given["urdf"].endswith(ENDING)):
+        raise InputError(f"{name}, arguments: expected a table of values of a xacro file, got {arguments!r:.100} "
+                         f"for {given['urdf']!r:.100}")  # fmt: skip
     files = FileLocator(folder, folders)
     model = content.get("model", "auto")
     if model not in _MODELS:
@@ -109,8 +116,8 @@ def _robot(name: str, content: dict[str, Any], mapping: Mapping) -> RobotEntry:
     return RobotEntry(
         name=name,
         motion=motion,
-        urdf=_description(given["urdf"], f"{name}, urdf", files),
-        srdf=_description(given["srdf"], f"{name}, srdf", files),
+        urdf=_description(given["urdf"], f"{name}, urdf", files, _words(arguments), folders),
+        srdf=_description(given["srdf"], f"{name}, srdf", files, {}, folders),
         urdf_topic=given["urdf_topic"],
         srdf_topic=given["srdf_topic"],
         packages=folders,
@@ -124,11 +131,18 @@ def _robot(name: str, content: dict[str, Any], mapping: Mapping) -> RobotEntry:
     )
 
 
-def _description(address: str, what: str, files: FileLocator) -> Description | None:
+def _words(arguments: dict[Any, Any]) -> dict[str, str]:
+    """Values as xacro takes them: YAML's truth as true and false."""
+    return {str(key): str(value).lower() if isinstance(value, bool) else str(value) for key, value in arguments.items()}
+
+
+def _description(
+    address: str, what: str, files: FileLocator, arguments: dict[str, str], packages: dict[str, Path]
+) -> Description | None:
     if not address:
         return None
     try:
-        return Description.read(files.find(address))
+        return Description.read(files.find(address), arguments, packages)
     except InputError as error:
         raise InputError(f"{what}: {error}") from None
 

@@ -224,6 +224,7 @@ def test_keys_of_a_robot_reach_its_links() -> None:
         ({**BOLTED, "allowed": {"base": ["floor"]}}, "arm, allowed: 'floor' is unknown"),
         ({**BOLTED, "allowed": ["floor"]}, "arm, allowed: expected lists of objects by link"),
         ({**BOLTED, "motion": "straight"}, "arm, motion: expected joints or arc, got 'straight'"),
+        ({**BOLTED, "arguments": {"prefix": "a"}}, "arm, arguments: expected a table of values of a xacro file, got"),
         ({**BOLTED, "packages": ["a"]}, "arm, packages: expected a table of folders by package"),
     ],
 )
@@ -237,6 +238,11 @@ def test_paths_are_relative_to_the_file_and_errors_name_its_line(tmp_path: Path)
     (tmp_path / "arm.urdf").write_text(ARM.read_text())
     path = tmp_path / "sources.yaml"
     path.write_text("frame: map\nrobots:\n  arm:\n    urdf: arm.urdf\n    base: {pose: [0, 0, 0]}\n")
+    Feed(load_mapping(path), Decoder(definitions()))
+    macros = ARM.read_text().replace("<robot ", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro" ', 1)
+    (tmp_path / "arm.xacro").write_text(macros.replace("</robot>", "<xacro:arg name='fast' default='1'/></robot>"))
+    lines = "    urdf: arm.xacro\n    arguments: {fast: true}\n    base: {pose: [0, 0, 0]}\n"
+    path.write_text(f"frame: map\nrobots:\n  arm:\n{lines}")
     Feed(load_mapping(path), Decoder(definitions()))
     path.write_text("frame: map\nrobots:\n  arm:\n    urdf: arms.urdf\n")
     mapping = load_mapping(path)
