@@ -19,6 +19,7 @@ from collision_monitor.shapes.registry import Box
 from collision_monitor.sources.ground.covariances import usable_blocks, yaw_alone
 from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
+from collision_monitor.sources.ground.motion_models import ARC, PEOPLE, MotionModels
 from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.prisms import covering_prism, load_prisms
 from collision_monitor.sources.ground.scene_states import carry_states, empty_states, turn_twists, turned_triangles
@@ -46,6 +47,7 @@ _LABELS: Final = (
     *("unknown", "car", "truck", "bus", "trailer", "motorcycle", "bicycle", "pedestrian", "animal", "hazard"),
     *("over_drivable", "under_drivable"),
 )
+_VEHICLES: Final = ("car", "truck", "bus", "trailer", "motorcycle", "bicycle")
 
 
 Found = tuple[DescribedTrack, int]
@@ -56,12 +58,14 @@ class AutowareSource(Source):
     """The tracks of one entry, with the shapes in the messages or with the entry's `each`."""
 
     def __init__(self, entry: ObjectEntry, message_type: str, mapping: Mapping) -> None:
-        entry.allow_only(("covariance", "forget_after", "min_existence", "shape_tolerance", "each"), message_type)
+        keys = ("covariance", "forget_after", "min_existence", "shape_tolerance", "each", "motion", "acceleration")
+        entry.allow_only(keys, message_type)
         if entry.shapes:
             raise InputError(f"{entry.name}, shape: {message_type} holds many objects; `each` is the shape of each")
         self.name, self.topics = entry.name, {entry.topic: (message_type,)}
         self._entry = entry
         self._tracks = TrackTable(entry.name, entry.forget_after)
+        self._models = MotionModels(entry.name, entry.motion, PEOPLE, _LABELS, dict.fromkeys(_VEHICLES, ARC))
         self._number = 0
         load_prisms()
         self._heard_ns = 0  # stamp of the last message: a tracker that is silent does not say that a track is gone
@@ -88,7 +92,9 @@ class AutowareSource(Source):
         if kept:
             states, covariance = self._states(kept, content, scene)
             given = covariance if frame is IDENTITY else carry_states(states, frame, covariance)
-            scene.observe(entry.name, states, stamp_ns, given, turns=True)
+            words = [_word(content.labels[row]) for _, row in kept]
+            turns = self._models.apply(states, words, scene.horizon)
+            scene.observe(entry.name, states, stamp_ns, given, turns=turns)
 
     def settle(self, now_ns: int, scene: SourceScene) -> None:
         """See Source."""
@@ -102,8 +108,7 @@ class AutowareSource(Source):
     def _track(self, key: bytes, label: int, stamp_ns: int, scene: SourceScene) -> DescribedTrack | None:
         if key not in self._tracks:
             self._number += 1
-        word = _LABELS[label] if label < len(_LABELS) else f"label{label}"
-        return self._tracks.get(key, f"{self._entry.name}_{word}_{self._number}", stamp_ns, scene)
+        return self._tracks.get(key, f"{self._entry.name}_{_word(label)}_{self._number}", stamp_ns, scene)
 
     def _described(self, found: list[Found], content: TrackArrays, scene: SourceScene) -> list[Found]:
         """Describe the tracks that are new or have left their described shapes. Return those that are described."""
@@ -156,7 +161,7 @@ class AutowareSource(Source):
         states["position"], states["quaternion"] = poses[:, :3], poses[:, 3:]
         states["quaternion"][content.orientation[rows] == _NO_ORIENTATION] = 0.0, 0.0, 0.0, 1.0
         states["linear"], states["angular"], states["acceleration"] = twists[:, :3], twists[:, 3:], acceleration
-        states["flags"][acceleration.any(1)] = StateFlag.ACCELERATION_VALID | StateFlag.STOPS
+        states["flags"][acceleration.any(1)] = StateFlag.ACCELERATION_VALID
         covariance = self._covariances(states, content, rows, scene) if self._entry.covariance else None
         turn_twists(states)
         return states, covariance
@@ -177,6 +182,11 @@ class AutowareSource(Source):
             return None
         joined[:, 6:] = turned_triangles(rotation_matrix(states["quaternion"]), joined)[:, 6:]
         return joined
+
+
+def _word(label: int) -> str:
+    """Return the class of a label."""
+    return _LABELS[label] if label < len(_LABELS) else f"label{label}"
 
 
 def _measured(content: TrackArrays) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:
