@@ -116,6 +116,11 @@ class Plans(Stage):
         """Slots of the bodies that follow a plan."""
         return np.ascontiguousarray(self._rows["slot"])
 
+    @property
+    def left_ids(self) -> list[int]:
+        """Ids of the bodies that left the last plan they had, ascending."""
+        return self._left.tolist()
+
     # ------------------------------------------------------------------ plans
 
     def follow(
@@ -143,6 +148,8 @@ class Plans(Stage):
         for name, value in tolerance._asdict().items():
             row[name] = value
         roster.bodies.planned[i] = True
+        if len(self._left):
+            self._left = np.setdiff1d(self._left, roster.bodies.id[i : i + 1])
 
     def _place(self, roster: Roster, count: int) -> int:
         """Index of the first of `count` free pieces behind all others. If there is no room, the unused ones go."""
