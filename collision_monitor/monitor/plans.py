@@ -43,6 +43,7 @@ from collision_monitor.motion.motion import (
     swept_box,
     twist_at,
 )
+from collision_monitor.motion.plan_deviation import STANDS
 from collision_monitor.motion.stated_motion import ACCELERATION, ANGULAR, COURSE, LINEAR, REST
 from collision_monitor.motion.trajectory import Tolerance, Trajectory
 from collision_monitor.records import PlanFlag
@@ -69,9 +70,6 @@ PLAN: Final = np.dtype(
     ]
 )
 """A plan in force."""
-
-STANDS: Final = 1e-3
-"""m/s: slowest planned velocity that has a direction."""
 
 ROOM: Final = 1.5
 """Width of a tube, in deviations of now. Smaller: a body whose deviation varies is predicted anew more often."""
