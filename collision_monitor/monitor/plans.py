@@ -117,7 +117,7 @@ class Plans(Stage):
     @property
     def left_ids(self) -> list[int]:
         """Ids of the bodies that left the last plan they had, ascending."""
-        return self._left.tolist()
+        return list(map(int, self._left))
 
     # ------------------------------------------------------------------ plans
 

@@ -33,7 +33,7 @@ NUMBERS: Final = {
 }
 """Keys with a number, their units and defaults."""
 
-KEYS: Final = (*PLACE, *BODY, "covariance", "without", "nan_is_free", "motion", "acceleration", *NUMBERS)
+KEYS: Final = (*PLACE, *BODY, "covariance", "without", "nan_is_free", "motion", "acceleration", "paths", *NUMBERS)
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,8 @@ class ObjectEntry:
     group, in place of those in the messages. pose: of a static object, in `frame` (empty: the
     monitor's). covariance: whether covariances in the messages are used. without: names of the objects
     whose points a scan leaves out. nan_is_free: whether its NaN mean that nothing is there. motion: how the objects
-    move on from their states. schedule: where the object is when, declared. given: the keys that the file holds. The
+    move on from their states. schedule: where the object is when, declared. paths: which predicted paths
+    count. given: the keys that the file holds. The
     numbers are those of NUMBERS.
     """
 
@@ -81,6 +82,7 @@ class ObjectEntry:
     nan_is_free: bool = False
     motion: MotionChoice = AS_USUAL
     schedule: Schedule | None = None
+    paths: str = "all"
     given: tuple[str, ...] = ()
 
     def describe(
@@ -190,6 +192,7 @@ def _entry(name: str, content: dict[str, Any], object_id: int) -> ObjectEntry:
         covariance=truth(content.get("covariance", True), f"{name}, covariance"),
         nan_is_free=truth(content.get("nan_is_free", False), f"{name}, nan_is_free"),
         motion=read_motion(content, name),
+        paths=text(content.get("paths", "all"), f"{name}, paths"),
         schedule=read_schedule(content["schedule"], name) if "schedule" in content else None,
         given=tuple(content),
         **values,

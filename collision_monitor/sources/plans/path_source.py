@@ -15,6 +15,7 @@ from collision_monitor.sources.ground.scene_states import carry_states, empty_st
 from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.messages.poses import put_pose
+from collision_monitor.sources.plans.headings import headings_along
 from collision_monitor.sources.plans.plan_entry import PlanEntry, read_plans
 from collision_monitor.sources.plans.timeless_path import SAME_PLACE, TimelessPath
 from collision_monitor.tolerances import LARGEST_INPUT
@@ -72,7 +73,7 @@ class PlanSource(Source):
         if frame is not IDENTITY:
             carry_states(rows, frame, None)
         if entry.by_path or not rows["quaternion"].any():
-            rows["quaternion"] = _along(rows["position"])
+            rows["quaternion"] = headings_along(rows["position"])
         poses = np.concatenate([rows["position"], rows["quaternion"]], axis=1)
         self._path = None
         if times is not None:
@@ -170,13 +171,3 @@ def _given_times(given: Any, rows: Any) -> tuple[Floats, NDArray[np.bool_]]:
     count = int(stands[0]) + 1 if len(stands) else len(times)
     kept = np.append(True, spans > 0.0) & (np.arange(len(times)) < count)
     return np.append(0.0, np.cumsum(np.where(np.isfinite(spans), spans, 0.0))), kept
-
-
-def _along(position: Floats) -> Floats:
-    """Quaternions (N, 4) with x along the way in the plane; the last as the one before, and so where it only climbs."""
-    steps = np.diff(position[:, :2], axis=0)
-    steps = np.concatenate([steps, steps[-1:]])
-    moves = np.linalg.norm(steps, axis=1) > 0.0
-    last = np.maximum.accumulate(np.where(moves, np.arange(len(steps)), 0))
-    half = 0.5 * np.arctan2(steps[last, 1], steps[last, 0])
-    return np.column_stack([np.zeros((len(half), 2)), np.sin(half), np.cos(half)])

@@ -21,7 +21,7 @@ STEP: Final = 0.1
 off its plan by up to a quarter of this. Smaller: plans of more pieces."""
 
 RAMP: Final = 0.25
-"""Largest such distance, in ways that the robot needs from rest to its full speed."""
+"""Largest such distance, in ways that the robot needs from rest to its full speed, and in the rest of the path."""
 
 MOST_STEPS: Final = 20_000
 """Points that are put into a path. A longer one than 2 km has longer steps."""
@@ -70,7 +70,7 @@ class TimelessPath:
         ahead = self._way[self._way > way]
         ways = np.append(way, ahead)
         if self._limits.vary:
-            ways = _refined(ways, min(STEP, RAMP * self._limits.ramp))
+            ways = _refined(ways, min(STEP, RAMP * min(self._limits.ramp, self.length - way)))
         poses = self._poses
         if len(ways) > len(ahead) + 1 or way > 0.0:
             poses = Trajectory(self._way, poses).rows(ways)[:, :LINEAR]
