@@ -97,15 +97,19 @@ class PlanSource(Source):
         self._path = None
 
     def _follow(self, now_ns: int, scene: SourceScene, expected: float, allowed: float = -1.0) -> None:
-        """Plan from where the object is now, unless that is nearer than `allowed` (m) to the expected way (m)."""
+        """Plan from where the object is now, unless that is nearer than `allowed` (m) to the expected way (m).
+
+        An object beside its path gets the plan from its begin, which it leaves at once, and no other one later.
+        """
         entry, path = self._entry, self._path
         if path is None:
             return
         state, way, speed = scene.waiting.state(entry.object_id, now_ns), expected, 0.0
         if state is not None and np.isfinite(state["position"]).all():
-            way, off = path.nearest(state["position"], expected, entry.tolerance.across)
-            speed = float(np.nan_to_num(np.linalg.norm(state["linear"])))
-            if allowed >= 0.0 and off > entry.tolerance.across:
+            nearest, off = path.nearest(state["position"], expected, entry.tolerance.across)
+            if off <= entry.tolerance.across:
+                way, speed = nearest, float(np.nan_to_num(np.linalg.norm(state["linear"])))
+            elif allowed >= 0.0:
                 return
         if abs(way - expected) <= allowed:
             return

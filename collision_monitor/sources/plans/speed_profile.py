@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 SLOWEST: Final = 1e-3
 """m/s: the least limit of a speed. Smaller: a wrong unit, and a plan of hours."""
 
-CHORD: Final = 0.25
+CHORD: Final = 0.5
 """m on both sides of a point over which the path's bend counts. Smaller: the steps of a path on a grid of 5 cm count as
 bends. Larger: a robot is planned faster through a tight bend than it goes."""
 
