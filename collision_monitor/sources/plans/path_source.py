@@ -30,6 +30,13 @@ EARLY: Final = 0.5
 """Part of the tolerance along a path by which an object may be early or late until its plan is made anew. Larger: it
 leaves its plan in the meantime. Smaller: more plans."""
 
+AHEAD: Final = 5.0
+"""Horizons of the monitor that a plan on a path without times covers. It is made anew when half of them are over.
+Larger: the plans of a robot that is late on a long path are larger. Smaller: more plans."""
+
+LEAST_AHEAD: Final = 10.0
+"""s that it covers at least."""
+
 NANOSECOND: Final = 1e-9
 
 Floats = NDArray[np.float64]
@@ -49,6 +56,7 @@ class PlanSource(Source):
         self.name, self.topics = f"{entry.name}, plan", {entry.topic: (PATH, AUTOWARE_TRAJECTORY)}
         self._entry = entry
         self._path: TimelessPath | None = None
+        self._goes_on = False  # beyond the plan in force
         self._progress: tuple[int, Floats, Floats] = 0, np.zeros(1), np.zeros(1)  # time 0 (ns), times (s), ways (m)
 
     def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
@@ -77,7 +85,7 @@ class PlanSource(Source):
         poses = np.concatenate([rows["position"], rows["quaternion"]], axis=1)
         self._path = None
         if times is not None:
-            scene.follow([_message(entry, times[kept], poses)], stamp_ns)
+            scene.follow([_message(entry, times[kept], poses, entry.then)], stamp_ns)
         else:
             self._path = TimelessPath(poses, entry.limits, stops=entry.then == Then.REST)
             self._follow(stamp_ns, scene, 0.0)
@@ -85,8 +93,10 @@ class PlanSource(Source):
     def settle(self, now_ns: int, scene: SourceScene) -> None:
         """See Source."""
         begin_ns, times, ways = self._progress
-        expected = float(np.interp((now_ns - begin_ns) * NANOSECOND, times, ways))
-        self._follow(now_ns, scene, expected, EARLY * self._entry.tolerance.along)
+        elapsed = (now_ns - begin_ns) * NANOSECOND
+        is_old = self._goes_on and elapsed > 0.5 * times[-1]
+        expected = float(np.interp(elapsed, times, ways))
+        self._follow(now_ns, scene, expected, -1.0 if is_old else EARLY * self._entry.tolerance.along)
 
     def restart(self, now_ns: int, scene: SourceScene) -> None:
         """See Source."""
@@ -96,10 +106,11 @@ class PlanSource(Source):
         """See Source."""
         self._path = None
 
-    def _follow(self, now_ns: int, scene: SourceScene, expected: float, allowed: float = -1.0) -> None:
+    def _follow(self, now_ns: int, scene: SourceScene, expected: float, allowed: float | None = None) -> None:
         """Plan from where the object is now, unless that is nearer than `allowed` (m) to the expected way (m).
 
-        An object beside its path gets the plan from its begin, which it leaves at once, and no other one later.
+        allowed: None for a new path. An object beside it gets the plan from its begin, which it leaves at once, and no
+        other one later.
         """
         entry, path = self._entry, self._path
         if path is None:
@@ -109,20 +120,23 @@ class PlanSource(Source):
             nearest, off = path.nearest(state["position"], expected, entry.tolerance.across)
             if off <= entry.tolerance.across:
                 way, speed = nearest, float(np.nan_to_num(np.linalg.norm(state["linear"])))
-            elif allowed >= 0.0:
+            elif allowed is not None:
                 return
-        if abs(way - expected) <= allowed:
+        if allowed is not None and abs(way - expected) <= allowed:
             return
         if way > path.length - SAME_PLACE:
             self._end(now_ns, scene)
             return
         times, poses, ways = path.plan_from(way, speed)
-        self._progress = now_ns, times, ways
-        scene.follow([_message(entry, times, poses)], now_ns)
+        count = int(np.searchsorted(times, max(AHEAD * scene.horizon, LEAST_AHEAD))) + 1
+        self._goes_on = count < len(times)
+        self._progress = now_ns, times[:count], ways[:count]
+        then = Then.GO_ON if self._goes_on else entry.then
+        scene.follow([_message(entry, times[:count], poses[:count], then)], now_ns)
 
     def _end(self, now_ns: int, scene: SourceScene) -> None:
         self._path = None
-        scene.follow([_message(self._entry, np.zeros(0), np.zeros((0, 7)))], now_ns)
+        scene.follow([_message(self._entry, np.zeros(0), np.zeros((0, 7)), self._entry.then)], now_ns)
 
 
 def make_plans(content: Any, mapping: Mapping) -> list[Source]:
@@ -130,9 +144,9 @@ def make_plans(content: Any, mapping: Mapping) -> list[Source]:
     return [PlanSource(entry) for entry in read_plans(content, mapping)]
 
 
-def _message(entry: PlanEntry, times: Floats, poses: Floats) -> ObjectTrajectory:
+def _message(entry: PlanEntry, times: Floats, poses: Floats, then: Then) -> ObjectTrajectory:
     tolerance = np.array(entry.tolerance, np.float64)
-    return ObjectTrajectory(times, poses, np.zeros((0, 6)), tolerance, entry.object_id, then=entry.then)
+    return ObjectTrajectory(times, poses, np.zeros((0, 6)), tolerance, entry.object_id, then=then)
 
 
 def _path_times(

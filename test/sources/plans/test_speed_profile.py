@@ -14,7 +14,7 @@ from hypothesis import given as examples
 from hypothesis import settings
 from hypothesis import strategies as st
 
-from collision_monitor.codec.trajectories import ObjectTrajectory
+from collision_monitor.codec.trajectories import ObjectTrajectory, Then
 from collision_monitor.sources.plans.speed_profile import SpeedLimits, profile_times
 from collision_monitor.sources.plans.timeless_path import TimelessPath
 
@@ -137,6 +137,23 @@ def test_a_robot_that_is_slower_than_its_path_gets_a_new_plan_and_one_that_keeps
     assert 5 < len(plans_of(slow)) < 29
     stamp, plan = plans_of(slow)[-1]
     assert plan.poses[0, 0] == pytest.approx((stamp - START) / SECOND * 0.5)
+
+
+def test_the_plans_on_a_long_path_are_short_and_follow_each_other() -> None:
+    """1 km in steps of 5 cm: a robot that keeps to it gets a plan each 5 s, and one that stands gets small ones."""
+    long = [(0.05 * k, 0, 0) for k in range(20_000)]
+    moves, stands = fed(speed=1.0), fed(speed=1.0)
+    for robot, speed in ((moves, 1.0), (stands, 0.0)):
+        at(robot, 0, 0.0, speed)
+        robot.give("/plan", START, path(long))
+        for k in range(1, 131):
+            at(robot, k, 0.1 * k * speed, speed)
+        assert max(len(plan.times) for _, plan in plans_of(robot)) < 250
+        assert all(plan.then == Then.GO_ON for _, plan in plans_of(robot))
+    begins = [(stamp - START) / SECOND for stamp, _ in plans_of(moves)]
+    assert begins == pytest.approx([0.0, 5.1, 10.2])
+    for stamp, plan in plans_of(moves):
+        assert plan.poses[0, 0] == pytest.approx((stamp - START) / SECOND)
 
 
 def test_a_robot_beside_its_path_gets_no_new_plan_and_one_at_its_end_loses_it() -> None:
