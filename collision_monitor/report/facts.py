@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from collision_monitor.report.object_tracks import Tracks
 from collision_monitor.session.history.alarms import Alarms, alarms_of
 from collision_monitor.session.history.alerts import Alert, AlertOutcome, alert_before, alerts_of
 from collision_monitor.session.history.history import CollisionEvent, Floats, History, Pair
-from collision_monitor.session.history.object_tracks import Tracks
 
 
 @dataclass(frozen=True, eq=False)

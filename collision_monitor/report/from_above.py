@@ -10,9 +10,9 @@ from matplotlib.figure import Figure
 
 from collision_monitor.report.facts import ReportFacts
 from collision_monitor.report.footprint import footprint
+from collision_monitor.report.object_tracks import ObjectTrack
 from collision_monitor.report.rendering import INK, PALETTE, Size
 from collision_monitor.session.history.history import CollisionEvent, Floats, History
-from collision_monitor.session.history.object_tracks import ObjectTrack
 from collision_monitor.settings.names import shortened
 
 if TYPE_CHECKING:

@@ -37,7 +37,6 @@ DOORS: dict[str, tuple[list[str], str]] = {
     "view": (["view", "PATH", "--port", "0"], ".mcap"),
     "tradeoff": (["tradeoff", "PATH"], ".mcap"),
     "tune": (["tune", "PATH"], ".mcap"),
-    "calibrate": (["calibrate", "PATH"], ".mcap"),
     "import MCAP": (["import", "PATH", "-o", "OUT"], ".mcap"),
     "import db3": (["import", "PATH", "-o", "OUT"], ".db3"),
     "import bag": (["import", "PATH", "-o", "OUT"], ".bag"),
@@ -61,7 +60,6 @@ RESULTS: dict[str, list[str]] = {
     "check --junit": ["check", "SESSION", "--expect", "EXPECT", "--junit", "PATH"],
     "replay --cut": ["replay", "SESSION", "--cut", "PATH"],
     "tune": ["tune", "SESSION", "-o", "PATH"],
-    "calibrate --png": ["calibrate", "SESSION", "--png", "PATH"],
     "tradeoff --csv": ["tradeoff", "SESSION", "--csv", "PATH"],
     "tradeoff --png": ["tradeoff", "SESSION", "--png", "PATH"],
 }
