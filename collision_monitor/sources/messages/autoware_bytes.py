@@ -37,7 +37,7 @@ _LEAST: Final = 16 + 8 + 8 * _KINEMATICS + 8 + 24
 """Bytes of the smallest object."""
 
 _HEAD, _U4, _U1F4 = struct.Struct("<fI"), struct.Struct("<I"), struct.Struct("<B3xf")
-_STEP: Final = struct.Struct("<iIf")
+_STEP: Final = struct.Struct("<lLf")
 _POSE: Final = 56
 
 
