@@ -2,7 +2,7 @@
 
 At every frame the monitor predicts the pairs that come within a clearance of each other. The recording shows the pairs
 that did. With uncertainty, each object declares the deviation of its kind from the stated motion in the *other* clips.
-Prints a Markdown table.
+Prints a Markdown table, with the velocities of the files, and with those of carts from their positions of WINDOW s.
 
     python benchmarks/early_warning.py ../shared/data/citr
     python benchmarks/early_warning.py ../shared/data/citr --png docs/images/early_warning.png
@@ -17,22 +17,22 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 import collision_monitor as cm
+from collision_monitor.accuracy.calibration.deviation import LAGS, Growth, growth_of
 from collision_monitor.narrow_phase.dispatch import contact_batch
+from collision_monitor.records import StateFlag
 from collision_monitor.settings.profile import Profile
 from collision_monitor.shapes.pose import rotation_matrix
 from collision_monitor.shapes.shape_table import ShapeTableBuilder
+from collision_monitor.sources.ground.twist_estimate import TwistEstimator
 from collision_monitor.world.recorded_tracks import FRAME_RATE, RecordedTracks
 
 Array = NDArray[np.float64]
 HORIZONS = (0.5, 1.0, 2.0)
 THRESHOLDS = (0.1, 0.3, 0.5)
-LAGS = (0.25, 0.5, 1.0, 1.5, 2.0)
-"""s: look-aheads at which the deviations are measured."""
-BALL = 2.23606797749979
-"""Radius of a ball in which a uniform distribution has a standard deviation of 1 along each axis."""
+WINDOW = 0.2
+"""s of the positions that give a velocity: what `collision-monitor calibrate` chooses for these clips."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +65,8 @@ class Reported:
     probability: Array
 
 
-def load(prefix: Path) -> Clip:
-    """Read all frames of a clip and compute the distances of all pairs."""
+def load(prefix: Path, *, from_positions: bool) -> Clip:
+    """Read all frames of a clip, and compute the distances of all pairs. from_positions: velocities of the carts."""
     scene = RecordedTracks(None, None, prefix)
     frames = round(scene.duration * FRAME_RATE) + 1
     states = []
@@ -74,6 +74,8 @@ def load(prefix: Path) -> Clip:
         scene.time = frame / FRAME_RATE
         states.append(scene.states())
     ids = [d.object_id for d in scene.descriptions]
+    if from_positions:
+        states = estimated(states, [d.object_id for d in scene.descriptions if "cart" in d.name])
     pairs = list(combinations(sorted(ids), 2))
     builder = ShapeTableBuilder()
     slot = {d.object_id: builder.append(*d.shapes[0]) for d in scene.descriptions}
@@ -87,6 +89,29 @@ def load(prefix: Path) -> Clip:
         slots = np.array([[slot[i] for i in pairs[k]] for k in both], np.int32).reshape(-1, 2)
         distance[frame, both] = contact_batch(builder.table, position, rotation, slots)[:, 0]
     return Clip(prefix.name, scene, states, pairs, distance)
+
+
+def estimated(frames: list[NDArray[np.void]], ids: list[int]) -> list[NDArray[np.void]]:
+    """The states, those of some objects with velocities from their positions where they have two."""
+    estimator, slots = TwistEstimator(), {i: k for k, i in enumerate(ids)}
+    estimator.grow(len(ids))
+    found = []
+    for frame, states in enumerate(frames):
+        chosen = np.isin(states["id"], ids)
+        own = np.array([slots[i] for i in states["id"][chosen].tolist()], np.int64)
+        unknown = states[chosen]
+        for slot in own[(unknown["flags"] & StateFlag.DISCONTINUITY) != 0].tolist():
+            estimator.forget(slot)
+        unknown["flags"] |= np.uint32(StateFlag.TWIST_UNKNOWN)
+        estimator.completed(unknown, own, round(frame / FRAME_RATE * 1e9), WINDOW)
+        estimator.write(unknown, own, everywhere=True)
+        first = (unknown["flags"] & StateFlag.TWIST_UNKNOWN) != 0
+        unknown[first] = states[chosen][first]
+        unknown["velocity_stddev"] = unknown["angular_velocity_stddev"] = 0.0
+        whole = states.copy()
+        whole[chosen] = unknown
+        found.append(whole)
+    return found
 
 
 def strayings(clip: Clip, kind: str) -> Strayings:
@@ -111,22 +136,20 @@ def strayings(clip: Clip, kind: str) -> Strayings:
     return Strayings(np.array(variance), count)
 
 
-def fit(all_of: list[Strayings]) -> Array:
-    """Standard deviations (3,) of position, velocity and acceleration with the best relative fit to the variances."""
+def fit(all_of: list[Strayings]) -> Growth:
+    """Standard deviations of position, velocity and acceleration with the best relative fit to the variances."""
     variance = np.average([s.variance for s in all_of], axis=0, weights=[s.count for s in all_of])
-    t = np.array(LAGS)
-    rows = np.stack([np.ones_like(t), t**2, 0.25 * t**4], axis=1) / variance[:, None]
-    return np.sqrt(nnls(rows, np.ones_like(t))[0])
+    return growth_of(variance, np.array(LAGS))
 
 
-def watch(clip: Clip, horizon: float, clearance: float, sigmas: dict[str, Array] | None) -> Array:
+def watch(clip: Clip, horizon: float, clearance: float, sigmas: dict[str, Growth] | None) -> Array:
     """Predictions at each frame (F, P): the probability if `sigmas` are declared, else 1 for a warning."""
     profile = Profile.named("balanced").replace(horizon=horizon, contact_margin=clearance)
     monitor = cm.Monitor(profile)
     kind_of = {}
     for d in clip.scene.descriptions:
         kind = kind_of[d.object_id] = "cart" if "cart" in d.name else "person"
-        bound = BALL * float(sigmas[kind][2]) if sigmas else 0.0
+        bound = sigmas[kind].most_acceleration if sigmas else 0.0
         monitor.describe(replace(d, max_linear_acceleration=bound))
     column = {pair: k for k, pair in enumerate(clip.pairs)}
     reported = np.zeros_like(clip.distance)
@@ -256,7 +279,16 @@ def main() -> None:
     prefixes = sorted({f.with_name(f.name.removesuffix("_ped.csv")) for f in args.folder.glob("*_ped.csv")})
     if len(prefixes) < 2:
         parser.error(f"folder: expected at least two clips NAME_ped.csv, found {len(prefixes)} in {args.folder}")
-    clips = [load(prefix) for prefix in prefixes]
+    for from_positions in (False, True):
+        clips = [load(prefix, from_positions=from_positions) for prefix in prefixes]
+        print(f"\nvelocities of {f'carts from their positions of {WINDOW:g} s' if from_positions else 'the files'}\n")
+        said = compare(clips, args.clearance)
+        if args.png and from_positions:
+            draw(clips, said, args.clearance, args.png)
+
+
+def compare(clips: list[Clip], clearance: float) -> dict[float, list[Reported]]:
+    """Print the table of the clips; return what was predicted at each horizon."""
     strayed = [{kind: strayings(clip, kind) for kind in ("person", "cart")} for clip in clips]
     declared = [
         {kind: fit([s[kind] for s in strayed if s is not own]) for kind in ("person", "cart")} for own in strayed
@@ -265,23 +297,22 @@ def main() -> None:
         values = "; ".join(f"{kind} {s[0]:.2f} m, {s[1]:.2f} m/s, {s[2]:.2f} m/s²" for kind, s in of.items())
         print(f"{clip.name}: {len(clip.states)} frames, declared from the other clips: {values}")
     print(
-        f"\n| s ahead | warned | encounters within {args.clearance:g} m | median lead (s) | moments found "
+        f"\n| s ahead | warned | encounters within {clearance:g} m | median lead (s) | moments found "
         "| warnings right | wrong ones missed by (m) | alerts a minute |\n|---:|---|---:|---:|---:|---:|---:|---:|"
     )
     said: dict[float, list[Reported]] = {}
     for horizon in HORIZONS:
         said[horizon] = [
-            Reported(watch(c, horizon, args.clearance, None) > 0.0, watch(c, horizon, args.clearance, sigmas))
+            Reported(watch(c, horizon, clearance, None) > 0.0, watch(c, horizon, clearance, sigmas))
             for c, sigmas in zip(clips, declared, strict=True)
         ]
         for threshold in (None, *THRESHOLDS):
             score = Score()
             for clip, reported in zip(clips, said[horizon], strict=True):
                 warned = reported.stated if threshold is None else reported.probability >= threshold
-                score.add(clip, warned, horizon, args.clearance)
+                score.add(clip, warned, horizon, clearance)
             print(score.row(horizon, "stated motion alone" if threshold is None else f"probability ≥ {threshold:g}"))
-    if args.png:
-        draw(clips, said, args.clearance, args.png)
+    return said
 
 
 if __name__ == "__main__":

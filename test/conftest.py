@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import HealthCheck, settings
+from settled_types import look_at_types
 
 if TYPE_CHECKING:
     from started_threads import StartedThreads
@@ -27,6 +28,7 @@ settings.register_profile(
 settings.register_profile("explore", max_examples=2000, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 
+look_at_types()
 
 
 @pytest.hookimpl(wrapper=True)

@@ -139,8 +139,6 @@ def test_the_first_calls_may_be_those_of_two_threads() -> None:
 
 CHANGE: dict[str, str] = {
     "_jit.compilation.Announcement.is_made": "a notice that is given once",
-    "_jit.direct._known": "the last argument tuples by identity: read once per call, so that a race costs a look",
-    "_jit.direct._numbers": "names of argument kinds, by setdefault, which is atomic",
 }
 """Data of modules that calls change, with the reason why threads may share it."""
 
@@ -152,7 +150,7 @@ OWN = {
 }
 """Classes of objects in modules that hold what changes, with the reason why threads may share them."""
 
-FROZEN = ("_jit.function.Function", "_jit.direct.DirectFunction", "_jit.settled.SettledFunction", "shapes.")
+FROZEN = ("_jit.function.Function", "_jit.settled.SettledFunction", "shapes.")
 """Beginnings of the names of further classes whose objects no call changes: kernels, which are loaded once, and shapes,
 whose trees are made once; what two threads make at the same time is equal."""
 

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from collision_monitor._jit import allocating_kernel, device, inlined, kernel
 from collision_monitor._jit.alignment import aligned_zeros
+from collision_monitor._jit.settled import settled
 from collision_monitor.broad_phase.region import Region, regions_overlap
 
 GRID_LEVELS: Final = 128
@@ -292,6 +293,7 @@ def read_boxes(box: Any, centre: Any, half: Any) -> None:
             half[i, 0] = np.nan
 
 
+@settled
 @kernel
 def remove_boxes(grid: HashedGrid, which: Any) -> None:
     """Remove the boxes `which` (M,)."""

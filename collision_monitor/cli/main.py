@@ -18,7 +18,7 @@ from collision_monitor.errors import CollisionMonitorError
 
 COMMANDS: Final = (
     "demo", "run", "top", "echo", "view", "sources", "rules", "world", "replay", "report", "compare",
-    "check", "conflicts", "salvage", "import", "tradeoff", "tune", "extremes", "bench", "warm-up",
+    "check", "conflicts", "salvage", "import", "tradeoff", "tune", "calibrate", "extremes", "bench", "warm-up",
 )  # fmt: skip
 """Commands in the order of `--help`. Each is a module of this package (`import_` for import) with an `add_parser`."""
 
@@ -48,6 +48,7 @@ examples:
   collision-monitor import bag --map map.yaml -o run.mcap  make a session from a bag
   collision-monitor tradeoff --scene fleet                 measure time and errors of each profile
   collision-monitor tune run.mcap --max-ttc-error 0.05     find the cheapest sufficient settings
+  collision-monitor calibrate run.mcap                     fit models of motion to what objects did
   collision-monitor extremes                               measure errors at extreme scales
   collision-monitor bench --scene boxes --n 10000          measure the time to find all contacts
   collision-monitor warm-up                                compile the kernels in advance

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Final
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from collision_monitor.codec.cdr import Buffer, Floats, Reader, Writer, write_header
 
-LEAST: Final = 58
+LEAST: Final = 62
 """Bytes of the shortest trajectory."""
 
 
@@ -32,7 +32,7 @@ class Then(IntEnum):
 
 @dataclass(frozen=True, eq=False)
 class ObjectTrajectory:
-    """The fields of the message: times (n,), poses (m, 7), twists (k, 6); tolerance (4,): across to time.
+    """The fields of the message: times (n,), poses (m, 7), twists (k, 6), accelerations (l, 6); tolerance (4,).
 
     The numbers of the elements and the values of between and then are not checked.
     """
@@ -45,6 +45,7 @@ class ObjectTrajectory:
     between: int = Between.STRAIGHT
     then: int = Then.REST
     tube: float = 0.0
+    accelerations: Floats = field(default_factory=lambda: np.zeros((0, 6)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,12 +69,13 @@ def decode_trajectories(data: Buffer) -> ObjectTrajectoryArray:
 
 def _read(reader: Reader) -> ObjectTrajectory:
     times = reader.sequence("<f8", 8, "times")
-    poses, twists = (
-        reader.sequence(np.dtype(("<f8", (width,))), 8, name) for name, width in (("poses", 7), ("twists", 6))
+    poses, twists, accelerations = (
+        reader.sequence(np.dtype(("<f8", (width,))), 8, name)
+        for name, width in (("poses", 7), ("twists", 6), ("accelerations", 6))
     )
     tolerance, tube = reader.floats(4, "across"), reader.scalar("f8", "tube")
     object_id, between, then = reader.scalar("u4", "id"), reader.scalar("u1", "between"), reader.scalar("u1", "then")
-    return ObjectTrajectory(times, poses, twists, tolerance, object_id, between, then, tube)
+    return ObjectTrajectory(times, poses, twists, tolerance, object_id, between, then, tube, accelerations)
 
 
 def encode_trajectories(stamp_ns: int, frame_id: str, trajectories: Sequence[ObjectTrajectory]) -> bytes:
@@ -82,7 +84,7 @@ def encode_trajectories(stamp_ns: int, frame_id: str, trajectories: Sequence[Obj
     write_header(writer, stamp_ns, frame_id)
     writer.scalar("u4", len(trajectories), "trajectories")
     for each in trajectories:
-        for array in (each.times, each.poses, each.twists):
+        for array in (each.times, each.poses, each.twists, each.accelerations):
             numbers = np.ascontiguousarray(array, "<f8")
             writer.scalar("u4", len(numbers), "length")
             if numbers.size:

@@ -56,7 +56,7 @@ def _apart_until(
         if not max(own.along, 0.0) + max(its.along, 0.0) + own.bulge + its.bulge + turned < gap:
             return t
         gap, t = gap - own.along - its.along - turned, stop
-        if t >= end:
+        if not t < end:
             return end
         if until_a <= t:
             one += 1

@@ -8,8 +8,8 @@ from typing import Any, Final
 import numpy as np
 
 from collision_monitor._jit import inlined, kernel
-from collision_monitor._jit.direct import direct
 from collision_monitor._jit.prefetch import prefetch
+from collision_monitor._jit.settled import settled
 from collision_monitor.impact.body_impact import Window, tube_of
 from collision_monitor.impact.coarse_impact import coarse_impact, has_bounds, may_meet
 from collision_monitor.impact.impact_record import BOUND_ONLY, CLEAR, UNRESOLVED, write_pair
@@ -79,7 +79,7 @@ def bound_impact(bodies: Any, i: int, j: int, window: Window, margin: float, eve
     meeting_of_spheres(A, B, approach, begin, first, event)
 
 
-@direct
+@settled
 @kernel
 def predict_pairs(
     multibody: Any, pairs: Any, now: float, query: Any, ending: SearchEnd, how: int, events: Any, scratch: Any

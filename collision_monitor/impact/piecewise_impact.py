@@ -48,7 +48,7 @@ def body_impact(
             least, tube = query.margin + query.tolerance, tube_of(A, B, begin)
             apart, n = clear_until(multibody, pair, (begin, end), least, tube, scratch)
             queries, is_near, begin = queries + n, apart == begin, apart
-            if begin >= end:
+            if not begin < end:
                 event.status = CLEAR
                 break
             continue
@@ -56,7 +56,7 @@ def body_impact(
         queries += chains_impact(table, parts, pair, Window(begin, stop), query, scratch, event)
         if event.status != CLEAR:
             unresolved = min(unresolved, event.lower)
-        if event.status == HIT or stop >= end:
+        if event.status == HIT or not stop < end:  # also where the end is no number
             break
         begin = stop
     if unresolved < inf:  # what is open in one piece may be certain in the next

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from collision_monitor import records
 from collision_monitor._jit import inlined, kernel
-from collision_monitor._jit.direct import direct
 from collision_monitor._jit.prefetch import prefetch
+from collision_monitor._jit.settled import settled
 from collision_monitor.errors import InputError
 from collision_monitor.impact.body_contact import RESULT, body_contact
 from collision_monitor.impact.body_impact import Scratch, Window
@@ -217,6 +217,7 @@ class ActivePairs(Stage):
         self._orphans = [(whole_fact(key, "orphans"), float(since)) for key, since in facts["orphans"]]
 
 
+@settled
 @kernel
 def _unite(
     ids: Any, used: Any, version: Any, pairs: Any, events: Any, carried: Any, due: Any, order: Any, new_pairs: Any,
@@ -300,7 +301,7 @@ def _ask_for(multibody: Any, pairs: Any, which: Any, at: int) -> None:
             prefetch(bodies.motion, np.intp(near.j))
 
 
-@direct
+@settled
 @kernel
 def _examine(
     multibody: Any, active: Active, which: Any, now: float, queries: Any, scratch: Scratch, later: Any

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from collision_monitor import records
 from collision_monitor._jit import inlined, kernel
-from collision_monitor._jit.direct import direct
 from collision_monitor._jit.prefetch import prefetch
+from collision_monitor._jit.settled import settled
 from collision_monitor.impact.body_contact import SHAPE_I, SHAPE_J, STATUS, UNSETTLED
 from collision_monitor.impact.body_impact import CLOSING
 from collision_monitor.impact.impact_record import BOUND_ONLY, HIT, TREE_BOUND, UNRESOLVED, ids_of
@@ -180,6 +180,7 @@ def mark_overtaken(predictions: Any, age: float) -> int:
     return n
 
 
+@settled
 @kernel
 def count_answers(pairs: Any, contacts: Any, predictions: Any) -> tuple[int, int]:
     """Count the pairs (PAIR) that touch, and the contacts and predictions that are UNRESOLVED."""
@@ -220,6 +221,7 @@ def _is_in_doubt(bodies: Any, i: int, j: int, distance: float, limits: StaleLimi
     return distance + widened + bodies.excess[i] + bodies.excess[j] > limits.margin
 
 
+@settled
 @kernel
 def write_contacts(
     pairs: Any, results: Any, bodies: Any, shape_index: Any, limits: StaleLimits, has_details: bool, contacts: Any
@@ -283,7 +285,7 @@ class Times(NamedTuple):
     stale_after: float
 
 
-@direct
+@settled
 @kernel
 def write_predictions(
     predicted: Predicted, bodies: Any, shape_index: Any, times: Times, predictions: Any, slots: Any
@@ -338,6 +340,7 @@ def write_predictions(
     return n
 
 
+@settled
 @kernel
 def chain_digest(digest: Any, words: Any) -> Any:
     """64-bit digest of `digest` followed by words (n,) uint64; four independent lanes, mixed at the end.

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor._jit.direct import direct
 from collision_monitor._jit.prefetch import prefetch
+from collision_monitor._jit.settled import settled
 from collision_monitor.broad_phase.box_pairs import box_pairs
 from collision_monitor.broad_phase.hashed_grid import HashedGrid, make_hashed_grid, read_boxes, regridded, remove_boxes
 from collision_monitor.broad_phase.region import regions_overlap
@@ -167,7 +167,7 @@ def _finds(bodies: BodyTable, is_new: Any, i: int, j: int) -> bool:
     return covered < other or (covered == other and i < j)
 
 
-@direct
+@settled
 @kernel
 def find_partners(bodies: Any, boxes: Any, search: Any, now: Any, margin: Any, pairs: Any) -> Any:
     """Write the pairs of each body of the search with all bodies whose swept box overlaps its own, each pair once.
@@ -213,7 +213,7 @@ def _reporter(bodies: BodyTable, box: Any, i: int, j: int, is_new: Any, now: flo
     return i
 
 
-@direct
+@settled
 @kernel
 def sweep(bodies: BodyTable, box: Any, search: GridSearch, top: int, now: float, margin: float, pairs: Any) -> int:
     """As `find_partners`, but by a test of each body of the search with all bodies in the first `top` slots.
@@ -235,7 +235,7 @@ def sweep(bodies: BodyTable, box: Any, search: GridSearch, top: int, now: float,
     return n
 
 
-@direct
+@settled
 @kernel
 def keep_new(bodies: BodyTable, box: Any, pairs: Any, is_new: Any, now: float, margin: float) -> int:
     """Move the pairs (P, 2) that `find_partners` would find to the front; return their number.
@@ -258,6 +258,7 @@ def keep_new(bodies: BodyTable, box: Any, pairs: Any, is_new: Any, now: float, m
     return n
 
 
+@settled
 @kernel
 def keep_checked(static: Any, group: Any, mask: Any, ids: Any, allowed: Any, pairs: Any) -> int:
     """Move the pairs (P, 2) that are checked to the front; return their number.

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor._jit.direct import direct
+from collision_monitor._jit.settled import settled
 from collision_monitor.impact.impact_record import BOUND_ONLY, HIT, IMPACT, UNRESOLVED, holds
 from collision_monitor.monitor.state.snapshot import Facts, Snapshot, Stage
 from collision_monitor.motion.bodies import BodyTable
@@ -66,6 +66,7 @@ def sort_order(events: Any, order: Any, spare: Any) -> None:
         order[m] = source[m]
 
 
+@settled
 @kernel
 def count_until(events: Any, time: float) -> int:
     """Count the events with `lower` <= time (s) in a sorted array: they are at its front."""
@@ -127,7 +128,7 @@ def _place(key: int, new: Any, place: Any) -> int:
     return at
 
 
-@direct
+@settled
 @kernel
 def keep_first(new: Any, bodies: BodyTable, pending: Any, pairs: Any, room: Any, keep: Any) -> int:
     """`EventList.first_of_pairs`; returns their number. room (R,) int32: a hash table. keep (n,) bool: all True."""

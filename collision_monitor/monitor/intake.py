@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from collision_monitor import records
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor._jit.direct import direct
+from collision_monitor._jit.settled import settled
 from collision_monitor.checks.numbers import as_numbers, hides_some
 from collision_monitor.errors import InputError, Refusal
 from collision_monitor.geometry.vector import Vector, cross, dot, magnitude
@@ -254,7 +254,7 @@ def _age_text(roster: Roster, slot: int, time: float) -> str:
     return f"got one that is {age:.3f} s older" if age > 0.0 else "got another one with the same stamp"
 
 
-@direct
+@settled
 @kernel
 def take_states(
     bodies: Any, slots: Any, numbers: Any, flags: Any, time: float, rates: Any, verdicts: Any

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, inlined, kernel
-from collision_monitor._jit.direct import direct
+from collision_monitor._jit.settled import settled
 from collision_monitor.broad_phase.hashed_grid import HashedGrid, put_box, remove_boxes
 from collision_monitor.geometry.vector import magnitude, minus, scaled
 from collision_monitor.monitor import filters
@@ -168,7 +168,7 @@ def _turned_away(bodies: Any, start: int, count: int, columns: Any, angles: Any)
         turned_away(bodies, start, count, columns, angles)
 
 
-@direct
+@settled
 @kernel
 def find_moved(
     bodies: Any, uncertainty: Uncertainty, count: int, seconds: Any, settings: Any, columns: Any, found: Any
@@ -306,6 +306,7 @@ def _is_wide_without_need(bodies: Any, i: int, age: float, settings: Any) -> boo
     return age <= settings.stale_after and bodies.motion[i].tube_1 > widest
 
 
+@settled
 @kernel
 def remember_cover(motion: Any, which: Any) -> None:
     """Record that the bodies `which` (M,) have been predicted until their cover times, by this motion (MOTION)."""
@@ -365,7 +366,7 @@ def set_cover(bodies: Any, i: int, now: float, horizon: float) -> None:
     m.cover = now + horizon + bodies.slack[i] * share
 
 
-@direct
+@settled
 @kernel
 def renew_motions(
     bodies: Any, uncertainty: Uncertainty, grid: HashedGrid, moved: Any, ending: Any, seconds: Any, limits: Any,

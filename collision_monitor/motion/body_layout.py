@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from collision_monitor._jit import inlined, kernel
+from collision_monitor._jit.settled import settled
 from collision_monitor.motion.bodies import Multibody
 from collision_monitor.shapes.kinds.box import BOX
 from collision_monitor.shapes.kinds.sphere import SPHERE
@@ -20,6 +21,7 @@ def lay_out_body(multibody: Multibody, i: int, slots: Sequence[int], shape_of: S
     _lay_out(multibody, i, np.array(slots), np.array(shape_of))
 
 
+@settled
 @kernel
 def _lay_out(multibody: Multibody, i: int, slots: Any, shape_of: Any) -> None:
     table, parts, bodies = multibody
@@ -59,6 +61,7 @@ def _is_revolved(table: Any, s: int) -> bool:
     return BALL[kind] or (along and REVOLVED[kind])
 
 
+@settled
 @kernel
 def note_plain(multibody: Multibody, which: Any) -> None:
     """Note which of the bodies `which` (M,) are plain: one ball or one box without margin, and the object itself.

@@ -1,7 +1,7 @@
 """Trajectories: planned motions, as pieces that follow each other, each of them one of the motions of course.py.
 
-A piece goes straight, along an arc, or stands. Curves (cubic Hermite splines) are cut into straight pieces with
-constant accelerations, and the tube of a piece bounds how far the curve is from it.
+A piece goes straight, along an arc, or stands. Curves (cubic and quintic Hermite splines) are cut into straight pieces
+with constant accelerations, and the tube of a piece bounds how far the curve is from it.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from collision_monitor._jit import allocating_kernel, kernel, outlined
 from collision_monitor.checks.numbers import as_numbers, checked_number
 from collision_monitor.errors import PoseError
 from collision_monitor.motion.course import ARC, STRAIGHT, bends, screw_velocity, turned_for
+from collision_monitor.motion.curves import cubic, parabolas, quintic
 from collision_monitor.motion.motion import turn_between, turn_quaternion, twist_on
 from collision_monitor.motion.stated_motion import (
     ACCELERATION,
@@ -33,6 +34,7 @@ from collision_monitor.tolerances import EPSILON, LARGEST_INPUT, NORMALISED, UNI
 Array = NDArray[np.float64]
 Between = Literal["straight", "arc", "curve"]
 Then = Literal["rest", "go on", "unknown"]
+_Pieces = tuple[Array, Array, Array]
 
 MOST_POINTS: Final = 100_000
 """Points of a trajectory: half an hour at 50 Hz. A trajectory takes 150 bytes for each piece."""
@@ -40,21 +42,8 @@ MOST_POINTS: Final = 100_000
 FASTEST: Final = 1e5
 """m/s, and rad/s. A plan that asks for more has a wrong time or a wrong unit."""
 
-CURVE_TOLERANCE: Final = 1e-6
-"""m: how far a curve may be from its pieces. Smaller: more pieces, by the root of the third order."""
-
 SHORTEST: Final = 1e-12
 """s between two points. Less: the third derivative of a curve overflows. Such points have a wrong unit."""
-
-MOST_PIECES: Final = 1_000_000
-"""Pieces of all curves of a trajectory, 150 MB. One that needs more has wider tubes."""
-
-MOST_PARTS: Final = 256
-"""Pieces of a curve between two points. A curve that needs more has a wider tube."""
-
-CUBIC_ERROR: Final = 1.0 / 124.0
-"""Largest distance of a cubic from the parabola through its ends and its middle, for a third derivative of 1 in a span
-of 1: sqrt(3) / 216, rounded up."""
 
 ROUND_OFF_ANGLE: Final = 64.0 * EPSILON
 """rad, up to which two orientations are one: quaternions of one orientation, computed in two ways, differ by as much.
@@ -84,9 +73,11 @@ class Trajectory(Frozen):
     times (N,): s from now on, rising; the first may lie in the past. Before it the body rests at its first pose. poses:
     (N, 7) x y z qx qy qz qw, or a sequence of what `as_pose` takes. twists (N, 6) or (N, 3): linear velocities (m/s,
     world axes) at the points, which a curve needs; how fast the body turns follows from the poses.
+    accelerations (N, 3): m/s^2, world axes, at the points of a curve.
     between: "straight", constant velocity and angular velocity (of a polyline with slerp); "arc", constant twist in the
     body's own frame, as a wheeled robot follows a path (Murray, Li and Sastry, 1994, 2.3); "curve", the cubic Hermite
-    spline, with a constant angular velocity between two points. The default is "curve" with twists, "straight" without.
+    spline, or with accelerations the quintic one, with a constant angular velocity between two points. The default is
+    "curve" with twists, "straight" without.
     A curve is known to 1e-6 m, so an impact with what it touches or slides along is unresolved.
     tube: how far the body's points may be off what lies between two points (m).
     then: what holds after the last point: "rest"; "go on" along the last piece; "unknown": no answer is clear beyond.
@@ -100,6 +91,8 @@ class Trajectory(Frozen):
     poses: Array
     twists: Array | None
     """(N, 3): linear velocities at the points, as far as they were given."""
+    accelerations: Array | None
+    """(N, 3): linear accelerations at the points, as far as they were given."""
     between: Between
     then: Then
     tube: float
@@ -116,6 +109,7 @@ class Trajectory(Frozen):
         poses: Any,
         twists: Any = None,
         *,
+        accelerations: Any = None,
         between: Between | None = None,
         then: Then = "rest",
         tube: float = 0.0,
@@ -127,9 +121,13 @@ class Trajectory(Frozen):
         _check_choice(then, "then", get_args(Then))
         known["times"] = times = _checked_times(times)
         known["poses"] = poses = _checked_poses(poses, len(times))
-        known["twists"] = velocities = None if twists is None else _checked_velocities(twists, len(times))
+        known["twists"] = velocities = None if twists is None else _checked_rates(twists, len(times), "twists", 6)
         if between == "curve" and velocities is None:
             raise PoseError("twists: expected linear velocities at the points of a curve, got none")
+        if between != "curve" and accelerations is not None:
+            raise PoseError(f"accelerations: expected a curve with twists, got accelerations and between={between!r}")
+        rates = None if accelerations is None else _checked_rates(accelerations, len(times), "accelerations", 3)
+        known["accelerations"] = rates
         known["between"], known["then"] = between, then
         known["tube"] = tube = checked_number(tube, "tube", "m", least=0.0, error=PoseError)
         spans = np.diff(times)
@@ -142,7 +140,7 @@ class Trajectory(Frozen):
             secants = np.diff(poses[:, :3], axis=0) / spans[:, None]
             _check_speeds(secants, rows[:, ANGULAR:ACCELERATION])
         if between == "curve" and velocities is not None:
-            rows, begins, tubes = _curves(times, poses, velocities, rows)
+            rows, begins, tubes = _curves(times, poses, velocities, rates, rows)
         elif between == "arc":
             _bend_rows(rows, np.diff(poses[:, :3], axis=0), turns, spans)
         else:
@@ -166,7 +164,7 @@ class Trajectory(Frozen):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles hold what it was made of."""
-        return _made_of, (self.times, self.poses, self.twists, self.between, self.then, self.tube)
+        return _made_of, (self.times, self.poses, self.twists, self.accelerations, self.between, self.then, self.tube)
 
     @property
     def pose(self) -> Pose:
@@ -201,14 +199,14 @@ class Trajectory(Frozen):
 
 
 def _made_of(
-    times: Array, poses: Array, twists: Array | None, between: Between, then: Then, tube: float
+    times: Array, poses: Array, twists: Array | None, rates: Array | None, between: Between, then: Then, tube: float
 ) -> Trajectory:  # fmt: skip
-    return Trajectory(times, poses, twists, between=between, then=then, tube=tube)
+    return Trajectory(times, poses, twists, accelerations=rates, between=between, then=then, tube=tube)
 
 
 def _flat(path: Trajectory) -> Trajectory:
     """The trajectory through the points of another one without height and tilt. Raises PoseError."""
-    poses, twists = np.zeros_like(path.poses), None
+    poses = np.zeros_like(path.poses)
     poses[:, :2], poses[:, 3:] = path.poses[:, :2], flat_quaternions(path.poses[:, 3:])
     down = np.flatnonzero(~poses[:, 3:].any(axis=1))
     if len(down):
@@ -216,9 +214,10 @@ def _flat(path: Trajectory) -> Trajectory:
         raise PoseError(
             f"expected z to point up for a shape of the plane, got quaternion {quaternion} at point {down[0]}"
         )
-    if path.twists is not None:
-        twists = path.twists * (1.0, 1.0, 0.0)
-    return _made_of(path.times, poses, twists, path.between, path.then, path.tube)
+    twists, accelerations = (
+        None if each is None else each * (1.0, 1.0, 0.0) for each in (path.twists, path.accelerations)
+    )
+    return _made_of(path.times, poses, twists, accelerations, path.between, path.then, path.tube)
 
 
 def _check_choice(value: Any, name: str, choices: tuple[str, ...]) -> None:
@@ -271,15 +270,16 @@ def _checked_poses(poses: Any, count: int) -> Array:
     return rows
 
 
-def _checked_velocities(twists: Any, count: int) -> Array:
-    """Linear velocities (N, 3) of twists."""
-    rows = np.array(as_numbers(twists, "twists", "numbers (N, 6)", PoseError))
-    if rows.shape not in ((count, 6), (count, 3)):
-        raise PoseError(f"twists: expected shape ({count}, 6) or ({count}, 3), one for each time, got {rows.shape}")
+def _checked_rates(rates: Any, count: int, name: str, width: int) -> Array:
+    """Linear velocities or accelerations (N, 3) of rows (N, width) or (N, 3)."""
+    rows = np.array(as_numbers(rates, name, f"numbers (N, {width})", PoseError))
+    if rows.shape not in ((count, width), (count, 3)):
+        shapes = f"({count}, 6) or ({count}, 3)" if width == 6 else f"({count}, 3)"
+        raise PoseError(f"{name}: expected shape {shapes}, one for each time, got {rows.shape}")
     bad = np.flatnonzero(~(np.abs(rows) <= FASTEST).all(axis=1))
     if len(bad):
         k = int(bad[0])
-        raise PoseError(f"twists: expected finite numbers up to {FASTEST:g}, got {rows[k].tolist()} at point {k}")
+        raise PoseError(f"{name}: expected finite numbers up to {FASTEST:g}, got {rows[k].tolist()} at point {k}")
     return np.ascontiguousarray(rows[:, :3])
 
 
@@ -324,32 +324,18 @@ def _bend_rows(rows: Any, moved: Any, turns: Any, spans: Any) -> None:
             rows[k, COURSE] = ARC
 
 
-def _curves(times: Array, poses: Array, velocities: Array, rows: Array) -> tuple[Array, Array, Array]:
-    """Pieces of the cubic Hermite spline through points with velocities (N, 3): numbers, begins and tubes.
+def _curves(times: Array, poses: Array, velocities: Array, accelerations: Array | None, rows: Array) -> _Pieces:
+    """Numbers, begins and tubes of the pieces of the spline through points with velocities and accelerations (N, 3).
 
     rows: those between the points, with their angular velocities.
     """
-    h = np.diff(times)[:, None]
-    p, v, v_end = poses[:-1, :3], velocities[:-1], velocities[1:]
-    secant = np.diff(poses[:, :3], axis=0) / h
-    a = (6.0 * secant - 4.0 * v - 2.0 * v_end) / h
-    j = 6.0 * (v + v_end - 2.0 * secant) / (h * h)
-    off = np.linalg.norm(j, axis=1) * h[:, 0] ** 3 * CUBIC_ERROR
-    parts = np.clip(np.ceil(np.cbrt(off / CURVE_TOLERANCE)), 1, MOST_PARTS).astype(int)
-    if parts.sum() > MOST_PIECES:
-        parts = np.maximum(parts * MOST_PIECES // parts.sum(), 1)
-    k = np.repeat(np.arange(len(parts)), parts)
-    nth = np.arange(len(k)) - np.repeat(np.cumsum(parts) - parts, parts)
-    span = (h[:, 0] / parts)[k][:, None]
-    s = nth[:, None] * span
-    pieces = carried(rows[k], s[:, 0])
-    position = p[k] + (v[k] + (a[k] / 2.0 + j[k] * s / 6.0) * s) * s
-    velocity, acceleration = v[k] + (a[k] + j[k] * s / 2.0) * s, a[k] + j[k] * s
-    # the parabola through both ends and the middle of j s^3 / 6 is j (3 h s^2 / 2 - h^2 s / 2) / 6
-    pieces[:, :3] = position
-    pieces[:, LINEAR:ANGULAR] = velocity - j[k] * span * span / 12.0
-    pieces[:, ACCELERATION:COURSE] = acceleration + j[k] * span / 2.0
-    return pieces, times[k] + s[:, 0], (off / parts**3)[k]
+    h, points = np.diff(times), poses[:, :3]
+    curves = cubic(h, points, velocities) if accelerations is None else quintic(h, points, velocities, accelerations)
+    found = parabolas(h, curves)
+    pieces = carried(rows[found.span], found.age)
+    pieces[:, :3], pieces[:, LINEAR:ANGULAR] = found.position, found.velocity
+    pieces[:, ACCELERATION:COURSE] = found.acceleration
+    return pieces, times[found.span] + found.age, found.tube
 
 
 def carried(numbers: Array, ages: Array) -> Array:

@@ -54,6 +54,8 @@ def trajectory_of(given: ObjectTrajectory) -> Trajectory:
             f"between and then: expected {list(_BETWEEN)} and {list(_THEN)}, got {given.between} and {given.then}"
         )
     twists = given.twists if len(given.twists) else None
+    accelerations = given.accelerations[:, :3] if len(given.accelerations) else None
+    kind, then = _BETWEEN[given.between], _THEN[given.then]
     return Trajectory(
-        given.times, given.poses, twists, between=_BETWEEN[given.between], then=_THEN[given.then], tube=given.tube
-    )  # fmt: skip
+        given.times, given.poses, twists, accelerations=accelerations, between=kind, then=then, tube=given.tube
+    )

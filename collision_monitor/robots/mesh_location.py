@@ -13,6 +13,7 @@ from collision_monitor.settings.regular_file import FOLDER, found_instead
 
 _PACKAGE_SCHEMES: Final = ("package://", "model://")
 _SHOWN: Final = 6
+_THIS_MACHINE: Final = ("", "localhost")  # RFC 8089
 _NO_NAMES: Final = ("", os.curdir, os.pardir)
 
 
@@ -36,7 +37,10 @@ class FileLocator:
         scheme, separator, rest = address.partition("://")
         if separator and scheme != "file":
             raise InputError(f"expected a path, file:// or package://, got {address!r:.200}")
-        path = Path(unquote(rest)) if separator else self._folder / address
+        host, slash, there = rest.partition("/")
+        if separator and (host not in _THIS_MACHINE or not slash):
+            raise InputError(f"expected file:///PATH, a file of this machine, got {address!r:.200}")
+        path = Path(unquote(slash + there)) if separator else self._folder / address
         if found := found_instead(path):
             raise InputError(f"expected the file {str(path)!r:.200}, got {found}")
         return path

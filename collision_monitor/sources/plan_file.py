@@ -6,7 +6,7 @@ objects:
     times: [0, 10, 12]                            # s, of one clock of all files
     poses: [[0, 0, 0], [10, 0, 0], [10, 2, 0]]    # x y z, or x y z qx qy qz qw
     headings: [0, 0, 1.57]                        # rad about z, in place of quaternions
-    between: straight                             # or arc, curve: see Trajectory
+    between: straight                             # or arc, curve (with `twists`, `accelerations`): see Trajectory
     then: rest                                    # or go on, unknown
   shelf: {static: true, shape: {box: [8, 1, 3]}, pose: [4, 3, 1.5]}
 ignore: [[agv_1, trailer_1]]                      # pairs that may touch
@@ -32,7 +32,7 @@ from collision_monitor.sources.ground.yaml_table import SHAPES, numbers, pose, s
 LARGEST_JSON: Final = 1 << 28
 """Bytes of a plan file in JSON: 10,000 plans of 200 points. One in YAML has the limits of all YAML files."""
 
-_PLAN: Final = ("times", "poses", "headings", "twists", "between", "then")
+_PLAN: Final = ("times", "poses", "headings", "twists", "accelerations", "between", "then")
 _KEYS: Final = ("shape", "shapes", "static", "pose", *_PLAN)
 
 
@@ -102,10 +102,11 @@ def _plan(given: dict[str, Any], name: str) -> Trajectory:
             )
         half = 0.5 * headings
         poses = np.column_stack([poses, np.zeros((len(half), 2)), np.sin(half), np.cos(half)])
-    choices = {key: given[key] for key in ("between", "then") if key in given}
-    twists = numbers(given["twists"], f"{name}, twists") if "twists" in given else None
+    choices: dict[str, Any] = {key: given[key] for key in ("between", "then") if key in given}
+    rates = (key for key in ("twists", "accelerations") if key in given)
+    choices |= {key: numbers(given[key], f"{name}, {key}") for key in rates}
     try:
-        return Trajectory(times, poses, twists, **choices)
+        return Trajectory(times, poses, **choices)
     except CollisionMonitorError as error:
         raise InputError(f"{name}, {error}") from None
 

@@ -196,7 +196,10 @@ def plans(dice: Dice, now_ns: int) -> bytes:
             times = np.cumsum([dice.number(0.05, 0.5) for _ in range(points)]) - dice.number(0.0, 0.5)
         poses = [dice.pose(REACH) for _ in range(points - (dice.is_hostile and dice.chance(0.1)))]
         twists = [dice.numbers(6, -2.0, 2.0) for _ in range(points if dice.chance(0.4) else 0)]
-        for rows in (times, poses, twists):
+        between = dice.word(8) if dice.is_hostile else dice.random.randrange(3 if twists else 2)
+        bent = between == 2 or dice.is_hostile
+        accelerations = [dice.numbers(6, -2.0, 2.0) for _ in range(points if bent and dice.chance(0.5) else 0)]
+        for rows in (times, poses, twists, accelerations):
             writer.scalar("u4", len(rows), "length")
             if len(rows):
                 writer.raw(np.array(rows, "<f8").tobytes(), 8)
@@ -204,8 +207,8 @@ def plans(dice: Dice, now_ns: int) -> bytes:
         writer.raw(np.array([wide * dice.number(0.01, 1.0) for _ in range(4)], "<f8").tobytes(), 8)
         writer.scalar("f8", dice.number(0.0, 0.05) if dice.chance(0.3) else 0.0, "tube")
         writer.scalar("u4", FIRST_ID + dice.random.randrange(IDS), "id")
-        for what in ("between", "then"):
-            writer.scalar("u1", dice.word(8) if dice.is_hostile else dice.random.randrange(2), what)
+        writer.scalar("u1", between, "between")
+        writer.scalar("u1", dice.word(8) if dice.is_hostile else dice.random.randrange(2), "then")
     return writer.finish()
 
 

@@ -9,14 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
+from scipy.interpolate import BPoly, CubicHermiteSpline
 from scipy.linalg import expm, logm
+from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation, Slerp
 
 import collision_monitor as cm
 from collision_monitor.errors import PoseError
-from collision_monitor.motion import trajectory
-from collision_monitor.motion.trajectory import CURVE_TOLERANCE, MOST_POINTS
+from collision_monitor.motion import curves
+from collision_monitor.motion.curves import CURVE_TOLERANCE
+from collision_monitor.motion.trajectory import MOST_POINTS
 
 Array = NDArray[np.float64]
 LINE = [(0, 0, 0), (1, 0, 0), (1, 4, 0)]
@@ -79,6 +81,53 @@ def test_a_curve_is_followed_by_more_pieces_where_it_bends_more() -> None:
         assert tube.max() <= CURVE_TOLERANCE
 
 
+def quintic(times: Any, points: Any, velocities: Any, accelerations: Any) -> BPoly:
+    """The spline of degree 5 by SciPy, in Bernstein form."""
+    return BPoly.from_derivatives(times, np.stack([points, velocities, accelerations], axis=1))
+
+
+@pytest.mark.parametrize("scale", [1e-3, 1.0, 100.0])
+def test_a_curve_with_accelerations_is_the_spline_of_degree_5(scale: float) -> None:
+    """Each piece stays within its tube, which the largest distance reaches; the orientation is that of the points."""
+    rng = np.random.default_rng(17)
+    for _ in range(30):
+        times, poses, _ = points(rng, 6)
+        poses[:, :3] *= scale
+        rates = scale * rng.normal(size=(6, 3)), scale * rng.normal(size=(6, 3)) * 3.0
+        path = cm.Trajectory(times, poses, rates[0], accelerations=rates[1])
+        ts = np.sort(rng.uniform(times[0], times[-1], 4000))
+        off = np.linalg.norm(path.rows(ts)[:, :3] - quintic(times, poses[:, :3], *rates)(ts), axis=1)
+        tube = path.tubes[path.piece(ts)]
+        assert (off <= tube + 1e-12 * scale).all()
+        assert off.max() > 0.3 * tube.max()
+        assert tube.max() <= CURVE_TOLERANCE or len(path.begins) > 256
+        assert path.at(ts[7]).rotation == pytest.approx(
+            Slerp(times, Rotation.from_quat(poses[:, 3:]))([ts[7]])[0].as_matrix(), abs=1e-9
+        )
+
+
+def test_accelerations_of_a_cubic_give_the_cubic() -> None:
+    times, poses, twists = points(np.random.default_rng(19), 8)
+    velocity = twists[:, :3]
+    for k in range(7):
+        h = times[k + 1] - times[k]
+        ends = CubicHermiteSpline(times[k : k + 2], poses[k : k + 2, :3], velocity[k : k + 2]).derivative(2)
+        given = np.array([ends(times[k]), ends(times[k + 1])])
+        two = times[k : k + 2], poses[k : k + 2], velocity[k : k + 2]
+        cubic, degree_5 = cm.Trajectory(*two), cm.Trajectory(*two, accelerations=given)
+        assert degree_5.begins == pytest.approx(cubic.begins, abs=1e-12 * h)
+        assert degree_5.numbers == pytest.approx(cubic.numbers, rel=1e-9, abs=1e-9)
+
+
+def test_a_body_on_a_curve_of_degree_5_meets_a_ball_when_it_does() -> None:
+    """Against a root of the polynomial: a lift that starts and ends at rest, of minimum jerk."""
+    lift = cm.Trajectory([0, 2], [(0, 0, 0), (0, 0, 3)], np.zeros((2, 3)), accelerations=np.zeros((2, 3)))
+    found = cm.time_of_impact(cm.Sphere(0.25), lift, cm.Sphere(0.25), cm.Motion(cm.Pose((0, 0, 2.0))), horizon=3.0)
+    s = brentq(lambda s: 3.0 * (10 * s**3 - 15 * s**4 + 6 * s**5) - 1.5, 0.0, 1.0)
+    assert found.status == "hit" and found.lower <= 2.0 * s <= found.upper
+    assert found.upper - found.lower < 1e-5
+
+
 def test_what_holds_after_the_last_point() -> None:
     assert cm.Trajectory([0, 1, 3], LINE).at(9.0).position.tolist() == [1, 4, 0]
     assert cm.Trajectory([0, 1, 3], LINE, then="go on").at(9.0).position.tolist() == [1, 16, 0]
@@ -120,6 +169,9 @@ def test_poses_in_every_form_and_a_plan_that_began_before() -> None:
         (([0, 1, 2], LINE, np.zeros((2, 6))), {}, r"twists: expected shape \(3, 6\)"),
         (([0, 1, 2], LINE, np.full((3, 6), 1e18)), {}, "twists: expected finite numbers up to 100000"),
         (([0, 1, 2], LINE), {"between": "curve"}, "twists: expected linear velocities"),
+        (([0, 1, 2], LINE, np.zeros((3, 3))), {"accelerations": LINE[:2]}, r"accelerations: expected shape \(3, 3\)"),
+        (([0, 1, 2], LINE), {"accelerations": np.zeros((3, 3))}, "accelerations: expected a curve with twists"),
+        (([0, 1, 2], LINE, np.zeros((3, 3))), {"accelerations": np.full((3, 3), np.nan)}, "accelerations: expected f"),
         (([0, 1, 2], LINE), {"between": "quintic"}, "between: expected one of 'straight', 'arc', 'curve'"),
         (([0, 1, 1e19], LINE), {}, r"times: expected finite numbers up to 1e\+18, got 1e\+19 at point 2"),
         (([0, 1e-200, 1], LINE, np.full((3, 3), 1e5)), {}, "times: expected at least 1e-12 s between two points, got"),
@@ -170,7 +222,7 @@ def test_orientations_that_differ_by_round_off_do_not_turn() -> None:
 
 
 def test_a_wild_curve_of_many_points_has_wider_tubes_in_place_of_more_memory(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(trajectory, "MOST_PIECES", 300)
+    monkeypatch.setattr(curves, "MOST_PIECES", 300)
     rng = np.random.default_rng(11)
     times, poses, velocities = np.arange(50) * 1.0, rng.normal(size=(50, 3)), rng.normal(size=(50, 3)) * 100.0
     path = cm.Trajectory(times, poses, velocities)

@@ -18,8 +18,10 @@ from collision_monitor.codec import (
     encode_trajectories,
 )
 from collision_monitor.errors import MessageError, Refusal
+from collision_monitor.motion.trajectory import Trajectory
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.pipeline.pipeline import Pipeline
+from collision_monitor.pipeline.plan_intake import trajectory_of
 from collision_monitor.records import STATE
 from collision_monitor.session import Recorder, Session
 from collision_monitor.session.replaying.replay import replay
@@ -75,13 +77,24 @@ def test_a_message_lets_an_object_follow_its_plan_and_an_empty_one_ends_that() -
 
 
 def test_the_bytes_come_back() -> None:
-    curve = ObjectTrajectory(np.arange(3.0), np.eye(3, 7), np.eye(3, 6), np.arange(4.0), 7, 2, 1)
+    rates = np.eye(3, 6), np.ones((3, 6))
+    curve = ObjectTrajectory(np.arange(3.0), np.eye(3, 7), rates[0], np.arange(4.0), 7, 2, 1, 0.5, rates[1])
     message = decode_trajectories(data := encode_trajectories(START, "map", [TURN, curve]))
     assert (message.stamp_ns, message.frame_id, len(message.trajectories)) == (START, "map", 2)
     assert encode_trajectories(message.stamp_ns, message.frame_id, message.trajectories) == data
     for cut in range(0, len(data) - 3):
         with pytest.raises(MessageError):
             decode_trajectories(data[:cut])
+
+
+def test_a_curve_of_degree_5_is_followed_as_it_is_by_the_monitor_itself() -> None:
+    times, poses = np.array([0.0, 2.0]), np.array([[0.0, 0, 0, 0, 0, 0, 1], [4.0, 0, 0, 0, 0, 0, 1]])
+    still = np.zeros((2, 6))
+    given = ObjectTrajectory(times, poses, still, ZEROS, 1, between=2, accelerations=still)
+    found = trajectory_of(decode_trajectories(encode_trajectories(START, "world", [given])).trajectories[0])
+    wanted = Trajectory(times, poses, still, accelerations=still[:, :3])
+    assert (found.numbers == wanted.numbers).all() and (found.tubes == wanted.tubes).all()
+    assert found.at(0.5).position[0] == pytest.approx(4.0 * (10 / 4**3 - 15 / 4**4 + 6 / 4**5), abs=1e-6)
 
 
 @pytest.mark.parametrize(
@@ -96,6 +109,7 @@ def test_the_bytes_come_back() -> None:
         (replace(TURN, times=1e-9 * TURN.times), Refusal.MALFORMED, "at most 100000 m/s"),
         (replace(TURN, twists=np.full((3, 6), 1e18), between=2), Refusal.MALFORMED, "twists: expected finite"),
         (replace(TURN, twists=np.zeros((1, 6))), Refusal.MALFORMED, "twists: expected shape"),
+        (replace(TURN, accelerations=np.zeros((3, 6))), Refusal.MALFORMED, "accelerations: expected a curve with"),
         (replace(TURN, between=2), Refusal.MALFORMED, "twists: expected linear velocities"),
         (replace(TURN, between=9), Refusal.MALFORMED, "between and then: expected"),
         (replace(TURN, then=9), Refusal.MALFORMED, "between and then: expected"),

@@ -82,6 +82,7 @@ def test_addresses_of_meshes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(tmp_path / "old"))
     addresses = (
         f"file://{tmp_path}/ours/meshes/part.obj",
+        f"file://localhost{tmp_path}/ours/meshes/part.obj",
         "package://given/meshes/part.obj",
         "package://installed/part.obj",
         "model://source/part.obj",
@@ -100,6 +101,7 @@ def test_addresses_of_meshes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         ('<mesh filename="package://nowhere/part.stl"/>', "in the package 'nowhere', got none (searched: no folder)"),
         ('<mesh filename="part.stl"/>', "part.stl', got nothing there"),
         ('<mesh filename="https://example.com/part.stl"/>', "expected a path, file:// or package://, got 'https:"),
+        ('<mesh filename="file://server/part.stl"/>', "expected file:///PATH, a file of this machine, got 'file://server/"),
         ('<mesh filename="r.stl"/>', "r.stl: expected a mesh in STL format: expected the 84 bytes of a head"),
         ("<mesh/>", "expected an attribute filename, got no attribute"),
         ('<mesh filename="part.obj" scale="1 0 1"/>', "expected a scale without zeros, got [1.0, 0.0, 1.0]"),

@@ -97,6 +97,7 @@ def test_trajectories(seed: int) -> None:
         assert each.tolerance.tolist() == [wanted.across, wanted.along, wanted.angle, wanted.time]
         assert (each.object_id, each.between, each.then) == (wanted.id, wanted.between, wanted.then)
         assert each.tube == wanted.tube
+        assert each.accelerations.tolist() == [flat(a) for a in wanted.accelerations]
     again = codec.encode_trajectories(it.stamp_ns, it.frame_id, it.trajectories)
     assert deserialize_message(again, msg.ObjectTrajectoryArray) == message
 

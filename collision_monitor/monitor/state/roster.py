@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import weakref
 from collections.abc import Hashable
 from itertools import chain
 from typing import Any
@@ -11,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import kernel
-from collision_monitor._jit.direct import forget
+from collision_monitor._jit.settled import settled
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.errors import InputError, UnsupportedError
 from collision_monitor.impact.impact_record import pair_keys
@@ -60,7 +59,6 @@ class Roster(Stage):
         self.planar = False
         self.renewed: set[int] = set()
         self.mesh_faces = MeshFaces()
-        weakref.finalize(self, forget)  # the kernels keep the arrays of their last call
         self._shapes = ShapeTableBuilder()
         self._slots: dict[int, int] = {}
         self._names: dict[int, str] = {}
@@ -425,6 +423,7 @@ def _check_chains(bodies: BodyTable, parts: Parts, kind: NDArray[Any]) -> None:
             slot = following[slot]
 
 
+@settled
 @kernel
 def count_bodies(
     used: Any, static: Any, seen: Any, time: Any, count: int, now: float, stale_after: float

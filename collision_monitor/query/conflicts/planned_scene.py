@@ -56,4 +56,5 @@ def _later(plan: Trajectory, seconds: float) -> Trajectory:
     if seconds == 0.0:
         return plan
     times: Any = plan.times + seconds
-    return Trajectory(times, plan.poses, plan.twists, between=plan.between, then=plan.then)
+    known: Any = {name: getattr(plan, name) for name in ("twists", "accelerations", "between", "then", "tube")}
+    return Trajectory(times, plan.poses, **known)

@@ -1,0 +1,1 @@
+"""How objects of a recording really moved: which model of motion predicts them best, and how far they are off it."""
