@@ -45,9 +45,8 @@ class ObjectEntry:
     group, in place of those in the messages. pose: of a static object, in `frame` (empty: the
     monitor's). covariance: whether covariances in the messages are used. without: names of the objects
     whose points a scan leaves out. nan_is_free: whether its NaN mean that nothing is there. motion: how the objects
-    move on from their states. schedule: where the object is when, declared. paths: which predicted paths
-    count. given: the keys that the file holds. The
-    numbers are those of NUMBERS.
+    move on from their states. schedule: where the object is when, declared. paths: which predicted paths count. given:
+    the keys that the file holds. The numbers are those of NUMBERS.
     """
 
     name: str
