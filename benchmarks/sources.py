@@ -25,9 +25,11 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "test" / "helpers"))
 
-from foreign_bag import STORE, odometry, transforms
-from foreign_messages import CYLINDER, decoder, point_cloud, track, tracked_objects
+from foreign_bag import STORE, T, odometry, pose, transforms
+from foreign_messages import AUTOWARE, CYLINDER, decoder, point_cloud, predicted_objects, track, tracked_objects
 
+from collision_monitor.pipeline.pipeline import Pipeline
+from collision_monitor.pipeline.topics import Topic
 from collision_monitor.sources import Feed, RawMessage, load_mapping
 
 TRACKS = 200
@@ -94,6 +96,8 @@ def costs(file: Path) -> dict[str, tuple[float, float]]:
             found[name].append(cpu(lambda message=message: feed.take(message)))
     for name, options in SCANS.items():
         found[name] = scan_costs(file, options)
+    for paths in ("all", "likeliest", "ignored"):
+        found[f"{TRACKS} predicted, paths {paths}"] = predicted_costs(file, paths)
     return {name: (float(np.median(times)), float(np.percentile(times, 99))) for name, times in found.items()}
 
 
@@ -112,6 +116,39 @@ def scan_costs(file: Path, options: str) -> list[float]:
         feed.take(raw("/odom", odometry("map", stamp, (0, 0, 0), (0, 0, 0, 1), (1, 0, 0), (0, 0, 0))))
         message = raw("/points", (kind, cloud))
         times.append(cpu(lambda message=message: feed.take(message)))
+    return times
+
+
+def predicted_costs(file: Path, paths: str) -> list[float]:
+    """CPU time (ms) of each message of objects with three paths of 20 poses, until the monitor has their plans."""
+    file.write_text(f"frame: map\nobjects:\n  people: {{topic: /predicted, paths: {paths}}}\n")
+    feed, pipeline = Feed(load_mapping(file), decoder()), Pipeline("balanced", "map")
+    p, v = people(np.random.default_rng(1), TRACKS)
+    duration, start, times = T["builtin_interfaces/msg/Duration"](0, 500_000_000), 10**18, []
+    feed.bind("/predicted", AUTOWARE + "PredictedObjects")
+    take = {
+        Topic.SHAPES: pipeline.on_shapes, Topic.TRAJECTORIES: pipeline.on_trajectories, Topic.STATES: lambda data: None
+    }  # fmt: skip
+
+    def process(message: RawMessage) -> None:
+        for each in feed.take(message):
+            take[each.topic](each.data)
+
+    feed.begin(0)
+    for k in range(40):
+        stamp, objects = start + k * 100_000_000, []
+        for number in range(TRACKS):
+            here = p[number] + 0.1 * k * v[number]
+            one = track(number, (*here, 0.9), linear=(*v[number], 0), label=7, kind=CYLINDER, predicted=True)
+            one.kinematics.predicted_paths = [
+                T[AUTOWARE + "PredictedPath"](
+                    [pose((*(here + 0.5 * j * v[number]), 0.9 + 0.01 * turn * j)) for j in range(20)], duration, 0.5
+                )
+                for turn in range(3)
+            ]
+            objects.append(one)
+        message = raw("/predicted", predicted_objects("map", stamp, *objects))
+        times.append(cpu(lambda message=message: process(message)))
     return times
 
 

@@ -101,7 +101,7 @@ class Alerts:
         """Return the bodies now, with the classes of all of them known."""
         self._update_classes(monitor.roster)
         now = 0.0 if monitor.last is None else monitor.now
-        return MonitoredBodies(monitor.roster, monitor.profile, now, self._scratch)
+        return MonitoredBodies(monitor.roster, monitor.profile, now, self._scratch, monitor.off_plan)
 
     def _update_classes(self, roster: Roster) -> None:
         if self._is_outdated:

@@ -30,9 +30,14 @@ _AHEAD: Final = ("time_to_collision", "time_headway")
 
 
 def rule_coverage(rules: Rules, classes: Classes, scene: MonitoredBodies) -> tuple[RuleCoverage, ...]:
-    """Return one element for each side of each rule that names a class, and for a rule between any two."""
+    """Return one element for each side of each rule that names a class, and for a rule between any two.
+
+    Rules about plans have none: they compare no objects.
+    """
     found = []
     for rule in rules.rules:
+        if rule.is_of_plans:
+            continue
         first, second = rule.between
         sides = {(first, second): None, (second, first): None}  # ordered, once each
         for own, against in sides:
@@ -107,7 +112,7 @@ def held_back_pairs(
     parts = []
     for number, rule in enumerate(rules.rules):
         found = measured.get(rule.name)
-        if found is None or not (reached := found.reached).any():
+        if found is None or rule.is_of_plans or not (reached := found.reached).any():
             continue
         which = np.flatnonzero(reached)
         keys = found.keys[which]

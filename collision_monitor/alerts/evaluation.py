@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.alerts.closest_approach import closest_approaches, sphere_approach
-from collision_monitor.alerts.measures import Array, Measures, Slots
+from collision_monitor.alerts.measures import COLUMNS, Array, Measures, Slots
 from collision_monitor.alerts.monitored_bodies import MonitoredBodies
 from collision_monitor.alerts.quiet import quiet_pairs
 from collision_monitor.alerts.rules import Rule, Rules
@@ -31,6 +31,8 @@ def evaluate_rule(
 
     answers: of all pairs in the answers. raised: keys of the pairs whose alert is raised, which are measured as well.
     """
+    if rule.is_of_plans:
+        return _off_plan(rule, classes, scene)
     found = answers.take(select(rules, rule, classes, scene, answers))
     if rule.needs_states:
         found = _with_near(rules, rule, classes, scene, found, raised)
@@ -39,6 +41,20 @@ def evaluate_rule(
     found.reached = _levels(rule, found)
     found.quiet = quiet_pairs(rule, scene, found)
     return found, _levels(rule, found)
+
+
+def _off_plan(rule: Rule, classes: Classes, scene: MonitoredBodies) -> tuple[Measures, NDArray[np.uint8]]:
+    """Return the members of the rule's class that left their plans, each of them as a pair with itself."""
+    ids = np.array(scene.off_plan, np.uint32)
+    slots = scene.roster.find_slots(ids)
+    chosen = classes.of(rule.between[0])[slots] & scene.present[slots] & (slots >= 0)
+    ids, slots = ids[chosen], slots[chosen]
+    found = Measures(pair_keys(ids, ids), slots, slots)
+    for name in COLUMNS:
+        found[name] = np.full(len(ids), np.nan)
+    found.uncertain = scene.stale[slots]
+    found.reached = np.full(len(ids), rule.levels[0].level, np.uint8)
+    return found, found.reached
 
 
 def _levels(rule: Rule, found: Measures) -> NDArray[np.uint8]:

@@ -67,7 +67,7 @@ def message(
         name_b=names[1],
         class_a=change.classes[0],
         class_b=change.classes[1],
-        text=f"{names[0]} and {names[1]}: {reason}",
+        text=f"{names[0] if id_a == id_b else f'{names[0]} and {names[1]}'}: {reason}",
     )
 
 
@@ -100,6 +100,8 @@ def _reason(head: Head, change: AlertChange, of: tuple[Rule, Measures] | None, a
         return f"cleared {lasted}"
     assert of is not None
     rule, measures = of
+    if rule.is_of_plans:
+        return "has left its plan"
     thresholds = [each for each in rule.levels if each.level == change.level and at >= 0]
     reasons = ", ".join(each.reasons(measures, at) for each in thresholds)
     doubt = " (not settled, or stale)" if change.cause is AlertCause.UNRESOLVED else ""

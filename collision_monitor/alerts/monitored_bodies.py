@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,13 +23,17 @@ class MonitoredBodies:
     goes along an arc; bending (N,): a bound on that of such a body until the horizon, else 0. radius (N,): of the
     sphere about the origin that holds the body (m); may be infinite. turning (N,): bound on the speed of its points
     about the origin until the horizon (m/s); speed (N,): on any now. doubt (N,): how far it may have left its path
-    since its last state (m). stale (N,): the last state is too old, or there is none. scratch: memory for the kernels,
+    since its last state (m). stale (N,): the last state is too old, or there is none. off_plan: ids of those that left
+    their last plan. scratch: memory for the kernels,
     of one thread; None: its own.
     """
 
-    def __init__(self, roster: Roster, profile: Profile, now: float, scratch: Scratch | None = None) -> None:
+    def __init__(
+        self, roster: Roster, profile: Profile, now: float, scratch: Scratch | None = None,
+        off_plan: Sequence[int] = (),
+    ) -> None:  # fmt: skip
         b, top = roster.bodies, roster.top
-        self.roster, self.profile, self.now = roster, profile, now
+        self.roster, self.profile, self.now, self.off_plan = roster, profile, now, off_plan
         self.scratch = make_scratch() if scratch is None else scratch
         there = extrapolated(b, np.arange(top), now, profile.horizon)
         age = there.age

@@ -42,6 +42,8 @@ silent."""
 _VALUES: Final = 5000
 """Values in a text: one hundred rules have 2,000."""
 
+_PLAN_RULE: Final = ("left_plan", "level", "raise_after", "clear_after")
+
 _RULE: Final = (
     *("between", *LEVELS, "raise_after", "clear_after", "quiet_at_rest", "quiet_when_parting"),
     *("inside", "outside", "protective_separation"),
@@ -72,6 +74,7 @@ class Rule:
     """One rule. between: two classes. levels: from the lowest on. Times in ns. inside, outside: names of zones.
 
     quiet_at_rest, quiet_when_parting: whether pairs that rest, or that move apart without touching, are left out.
+    is_of_plans: it is about each object of the first class that has left its plan, not about pairs.
     """
 
     name: str
@@ -84,6 +87,7 @@ class Rule:
     inside: tuple[str, ...] = ()
     outside: tuple[str, ...] = ()
     separation: ProtectiveSeparation | None = None
+    is_of_plans: bool = False
 
     @property
     def measures(self) -> frozenset[str]:
@@ -210,6 +214,8 @@ def _read_between(entry: YamlEntry, classes: Mapping[str, ObjectClass]) -> tuple
 
 
 def _read_rule(name: str, entry: YamlEntry, classes: Mapping[str, ObjectClass], zones: Mapping[str, Zone]) -> Rule:
+    if isinstance(entry.value, dict) and "left_plan" in entry.value:
+        return _read_plan_rule(name, entry.table(_PLAN_RULE), classes)
     content = entry.table(_RULE)
     if "between" not in content:
         raise entry.error("the key `between` with two classes", "none")
@@ -236,6 +242,24 @@ def _read_rule(name: str, entry: YamlEntry, classes: Mapping[str, ObjectClass], 
         separation=read_protective_separation(content["protective_separation"])
         if "protective_separation" in content
         else None,
+    )
+
+
+def _read_plan_rule(name: str, content: Mapping[str, YamlEntry], classes: Mapping[str, ObjectClass]) -> Rule:
+    """Read a rule about objects that have left their plans."""
+    of = content["left_plan"]
+    if of.text() not in (ANY, *classes):
+        raise of.unknown(of.text(), (ANY, *classes), "class")
+    level = content["level"].text() if "level" in content else LEVELS[1]
+    if level not in LEVELS:
+        raise content["level"].unknown(level, LEVELS, "level")
+    return Rule(
+        name,
+        (of.text(), of.text()),
+        (Thresholds(LEVELS.index(level) + 1, {}),),
+        raise_after=_delay(content, "raise_after"),
+        clear_after=_delay(content, "clear_after"),
+        is_of_plans=True,
     )
 
 

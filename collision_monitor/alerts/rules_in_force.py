@@ -33,6 +33,8 @@ def rules_in_force(rules: Rules, array: CollisionAlertArray, name_of: Callable[[
 
 
 def _in_force(rule: Rule, array: CollisionAlertArray, name_of: Callable[[int], str]) -> RuleInForce:
+    if rule.is_of_plans:
+        return RuleInForce(rule.name, f"covers the plans of {rule.between[0]}", True, rule_values(rule))
     own = [k for k, each in enumerate(array.coverage) if each.rule == rule.name]
     covered = []
     for k in own:
@@ -58,12 +60,17 @@ def _in_force(rule: Rule, array: CollisionAlertArray, name_of: Callable[[int], s
 
 def rule_values(rule: Rule) -> dict[str, str]:
     """Return the keys of a rule with their values in words, in the order to show them."""
+    delays = {
+        "raise_after [s]": f"{rule.raise_after * NANOSECOND:g}",
+        "clear_after [s]": f"{rule.clear_after * NANOSECOND:g}",
+    }
+    if rule.is_of_plans:
+        return {"left_plan": rule.between[0], "level": LEVELS[rule.levels[0].level - 1], **delays}
     return {
         "between": " and ".join(rule.between),
         **{LEVELS[each.level - 1]: _thresholds(each.values) for each in rule.levels},
         **{side: ", ".join(names) for side, names in (("inside", rule.inside), ("outside", rule.outside)) if names},
-        "raise_after [s]": f"{rule.raise_after * NANOSECOND:g}",
-        "clear_after [s]": f"{rule.clear_after * NANOSECOND:g}",
+        **delays,
         "quiet_at_rest": str(rule.quiet_at_rest).lower(),
         "quiet_when_parting": str(rule.quiet_when_parting).lower(),
     }

@@ -43,6 +43,7 @@ from collision_monitor.motion.motion import (
     swept_box,
     twist_at,
 )
+from collision_monitor.motion.plan_deviation import STANDS
 from collision_monitor.motion.stated_motion import ACCELERATION, ANGULAR, COURSE, LINEAR, REST
 from collision_monitor.motion.trajectory import Tolerance, Trajectory
 from collision_monitor.records import PlanFlag
@@ -69,9 +70,6 @@ PLAN: Final = np.dtype(
     ]
 )
 """A plan in force."""
-
-STANDS: Final = 1e-3
-"""m/s: slowest planned velocity that has a direction."""
 
 ROOM: Final = 1.5
 """Width of a tube, in deviations of now. Smaller: a body whose deviation varies is predicted anew more often."""
@@ -116,6 +114,11 @@ class Plans(Stage):
         """Slots of the bodies that follow a plan."""
         return np.ascontiguousarray(self._rows["slot"])
 
+    @property
+    def left_ids(self) -> list[int]:
+        """Ids of the bodies that left the last plan they had, ascending."""
+        return list(map(int, self._left))
+
     # ------------------------------------------------------------------ plans
 
     def follow(
@@ -143,6 +146,8 @@ class Plans(Stage):
         for name, value in tolerance._asdict().items():
             row[name] = value
         roster.bodies.planned[i] = True
+        if len(self._left):
+            self._left = np.setdiff1d(self._left, roster.bodies.id[i : i + 1])
 
     def _place(self, roster: Roster, count: int) -> int:
         """Index of the first of `count` free pieces behind all others. If there is no room, the unused ones go."""

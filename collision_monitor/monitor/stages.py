@@ -130,6 +130,11 @@ class Stages:
         return sorted(self._roster.bodies.id[self._plans.slots].tolist())
 
     @property
+    def off_plan(self) -> list[int]:
+        """Ids of the objects that left their last plan and have no other one so far, ascending."""
+        return self._plans.left_ids
+
+    @property
     def plan(self) -> ScenePlan:
         """The tests and grid cells that the objects described now require; `print` shows them."""
         is_uncertain = self._uncertain.counts(self._profile)

@@ -39,9 +39,12 @@ def _follow(monitor: Monitor, given: ObjectTrajectory, stamp_ns: int) -> None:
     if not len(given.times):
         monitor.follow(given.object_id, None)
         return
-    plan = trajectory_of(given)
-    tolerance = Tolerance(*given.tolerance.tolist()) if given.tolerance.any() else Tolerance()
-    monitor.follow(given.object_id, plan, stamp_ns=stamp_ns, tolerance=tolerance)
+    monitor.follow(given.object_id, trajectory_of(given), stamp_ns=stamp_ns, tolerance=tolerance_of(given))
+
+
+def tolerance_of(given: ObjectTrajectory) -> Tolerance:
+    """The tolerance in a message; four zeros: the default."""
+    return Tolerance(*given.tolerance.tolist()) if given.tolerance.any() else Tolerance()
 
 
 def trajectory_of(given: ObjectTrajectory) -> Trajectory:

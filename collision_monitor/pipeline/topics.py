@@ -66,6 +66,7 @@ class Topic(Enum):
 
     MONITORED_SHAPES = "monitored/shapes", _OBJECTS, Quality(100, durability=LATCHED)
     MONITORED_STATES = "monitored/states", _OBJECT_STATES, Quality(10, "best_effort")
+    MONITORED_PLANS = "monitored/trajectories", _PLANS, Quality(100)
     """What the node takes from its own topics and its sources, for viewers. Not recorded, because the inputs are."""
 
     SOURCES = "sources", "diagnostic_msgs/msg/DiagnosticArray", Quality(1)

@@ -102,7 +102,7 @@ def _level(level: int) -> str:
 
 
 def _name(history: History, key: Key) -> str:
-    pair = " – ".join(shortened(history.name_of(object_id), 14) for object_id in key[1:])
+    pair = " – ".join(shortened(history.name_of(object_id), 14) for object_id in dict.fromkeys(key[1:]))
     return f"{pair} ({shortened(key[0], 12)})"
 
 

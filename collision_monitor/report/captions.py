@@ -7,6 +7,7 @@ from collision_monitor.report.assessment import counted
 from collision_monitor.report.facts import ReportFacts
 from collision_monitor.report.figures import CURVES, NEAR, PAIRS, drawn_collisions, largest_error
 from collision_monitor.report.from_above import AROUND, EVENTS
+from collision_monitor.report.plans_from_above import plan_caption
 from collision_monitor.session.history.history import History
 
 
@@ -18,6 +19,7 @@ def captions(history: History, facts: ReportFacts) -> dict[str, str]:
         "predicted": _predicted(facts),
         "distances": _distances(),
         "events": _events(facts),
+        "plans": plan_caption(history),
         "steps": _steps(history),
     }
 

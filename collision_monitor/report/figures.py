@@ -14,6 +14,7 @@ from matplotlib.patches import Patch
 from collision_monitor.report.alert_bars import alert_figure
 from collision_monitor.report.facts import ReportFacts
 from collision_monitor.report.from_above import from_above
+from collision_monitor.report.plans_from_above import plan_figure
 from collision_monitor.report.rendering import CONTACT, INK, PALETTE, POSSIBLE, WARNING, Size, styled
 from collision_monitor.session.history.alerts import stated_error
 from collision_monitor.session.history.history import CollisionEvent, Floats, History, Pair
@@ -44,6 +45,7 @@ def figures(history: History, facts: ReportFacts, size: Size) -> dict[str, Figur
         "predicted": _predicted,
         "distances": _distances,
         "events": from_above,
+        "plans": plan_figure,
         "steps": lambda history, _, size: _steps(history, size),
     }
     with styled():

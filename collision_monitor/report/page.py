@@ -15,6 +15,7 @@ from collision_monitor.report.assessment import assess, counted
 from collision_monitor.report.captions import captions
 from collision_monitor.report.facts import ReportFacts, gather
 from collision_monitor.report.figures import figures
+from collision_monitor.report.plans_from_above import plan_table
 from collision_monitor.report.rendering import BROAD, NARROW, as_png, as_svg
 from collision_monitor.session.history.history import CollisionEvent, History
 from collision_monitor.session.output_file import check_output
@@ -31,6 +32,7 @@ PICTURES: Final = {
     "predicted": "Predicted against actual",
     "distances": "The riskiest pairs",
     "events": "From above",
+    "plans": "Plans",
     "steps": "Step times",
 }
 """Titles of the figures, by the names that `figures` and `captions` use, in their order on the page."""
@@ -129,10 +131,12 @@ def check_report(
 def page(history: History, facts: ReportFacts, pictures: dict[str, str]) -> str:
     """Return the whole page. pictures: HTML of the figures, by the names that `figures` uses."""
     said = captions(history, facts)
-    drawn = [_section(title, said[name], pictures.get(name)) for name, title in PICTURES.items()]
-    alerts = drawn[1] + alert_table(history) if drawn[1] else _without_alerts(history)
-    above = [_verdict(history, facts), _unmonitored(history), drawn[0], alerts, _collisions(history, facts)]
-    sections = [*above, *drawn[2:], _provenance(history)]
+    drawn = {name: _section(title, said[name], pictures.get(name)) for name, title in PICTURES.items()}
+    alerts = drawn["alerts"] + alert_table(history) if drawn["alerts"] else _without_alerts(history)
+    drawn["plans"] += plan_table(history)
+    above = [_verdict(history, facts), _unmonitored(history), drawn["timeline"], alerts, _collisions(history, facts)]
+    below = [part for name, part in drawn.items() if name not in ("timeline", "alerts")]
+    sections = [*above, *below, _provenance(history)]
     title = escape(history.name)
     return (
         f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{title}</title>\n'

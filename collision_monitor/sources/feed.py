@@ -27,7 +27,7 @@ from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.ground.source_time import MAX_TIME_STEP, MessageStamp, SourceTime
 from collision_monitor.sources.ground.unmonitored import Unmonitored
 from collision_monitor.sources.ground.waiting_states import Step
-from collision_monitor.sources.kinds import BY_TYPE, SECTIONS
+from collision_monitor.sources.kinds import BY_TYPE, beside_topics
 from collision_monitor.sources.messages.static_objects import StandingObjects
 from collision_monitor.sources.messages.tf_objects import FrameSource
 from collision_monitor.sources.messages.transform_arrays import TRANSFORMS, TransformArrays
@@ -109,10 +109,9 @@ class Feed:
         self._by_topic: dict[str, list[Source]] = {}
         self._types: dict[str, dict[str, None]] = {}  # by topic, those that its sources take
         self.owners: dict[str, str] = {}
-        for name, content in mapping.sections.items():
-            for source in SECTIONS[name](content, mapping):
-                self._add(source, source.topics)
-                self.owners.update(dict.fromkeys(source.topics, source.name))
+        for source in beside_topics(mapping):
+            self._add(source, source.topics)
+            self.owners.update(dict.fromkeys(source.topics, source.name))
 
     @property
     def least_period(self) -> float:

@@ -28,7 +28,7 @@ from collision_monitor.sources.kinds import BY_TYPE
 from collision_monitor.sources.messages.tf_objects import TRANSFORMS
 
 _INPUTS: Final = (Topic.STATES, Topic.SHAPES, Topic.TRAJECTORIES)
-_REPEATED: Final = (Topic.MONITORED_STATES.path, Topic.MONITORED_SHAPES.path)
+_REPEATED: Final = (Topic.MONITORED_STATES.path, Topic.MONITORED_SHAPES.path, Topic.MONITORED_PLANS.path)
 """Where a monitor publishes its inputs again; used only if a bag lacks the inputs, which came from sources."""
 
 

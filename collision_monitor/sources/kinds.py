@@ -16,6 +16,7 @@ from collision_monitor.sources.messages.markers import MARKER, MARKERS, MarkerSo
 from collision_monitor.sources.messages.poses import ODOMETRY, POSE, POSE_WITH_COVARIANCE, PoseSource
 from collision_monitor.sources.messages.tf_objects import TRANSFORMS, FrameSource
 from collision_monitor.sources.plans.path_source import make_plans
+from collision_monitor.sources.plans.schedule_source import ScheduleSource
 from collision_monitor.sources.robot.planning_scene import COLLISION_OBJECT, PLANNING_SCENE, planning_world
 from collision_monitor.sources.robot.robot_section import make_robots
 
@@ -38,9 +39,20 @@ BY_TYPE: Final[dict[str, Callable[[ObjectEntry, str, Mapping], Source]]] = {
 """Makes the source of an entry of `objects:` from the entry, the type of its topic, and the whole file. Raises
 InputError for an entry that does not fit the type."""
 
-SECTIONS: Final[dict[str, Callable[[Any, Mapping], list[Source]]]] = {
+_SECTIONS: Final[dict[str, Callable[[Any, Mapping], list[Source]]]] = {
     "robots": make_robots,
     "plans": make_plans,
 }
 """Makes the sources of a section of the file, such as `robots`, from the content of that section, checked here, and the
 rest of the file. Raises InputError. The name is also in `mapping.SECTIONS`."""
+
+
+def beside_topics(mapping: Mapping) -> list[Source]:
+    """Return the sources of a file that do not wait for the type of a topic: schedules, and sections.
+
+    Raises InputError.
+    """
+    found: list[Source] = [ScheduleSource(each, each.schedule) for each in mapping.sources if each.schedule is not None]
+    for name, content in mapping.sections.items():
+        found += _SECTIONS[name](content, mapping)
+    return found

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from collision_monitor import records
 from collision_monitor.motion.moved_states import moved_states
+from collision_monitor.pipeline.followed_plans import FollowedPlan
 from collision_monitor.view.bodies import DescribedBodies, Floats, Indices
 from collision_monitor.view.levels import Level, Pair
 
@@ -21,7 +22,8 @@ class Moment:
     body (n,): rows of `bodies` with a pose, ascending by id; state (n,): the last one of each, records.STATE (of a
     static one: its pose); age (n,): s from that state to the step. contacts, predictions: of the step, records.CONTACT
     and PREDICTION. names: of the objects that the answers mention. alerts: the raised ones; None without rules.
-    is_known: whether there are answers; without them, nothing may be shown as clear.
+    plans: of the objects that follow one, by id; left_plans: ids of those that left theirs. is_known: whether there are
+    answers; without them, nothing may be shown as clear.
     """
 
     bodies: DescribedBodies
@@ -35,6 +37,8 @@ class Moment:
     stamp_ns: int = 0
     step: int = 0
     alerts: Mapping[Pair, Level] | None = None
+    plans: Mapping[int, FollowedPlan] = field(default_factory=dict)
+    left_plans: frozenset[int] = frozenset()
     is_known: bool = True
 
     @property
@@ -65,8 +69,12 @@ class Moment:
         return self.bodies.descriptions[at].name if known else f"object_{object_id}"
 
     def poses_at(self, rows: Indices, after: Floats) -> tuple[Floats, Floats]:
-        """Return positions (k, 3) and quaternions (k, 4) `after` (k,) s from the step, as the last states move.
-
-        """
+        """Return positions (k, 3) and quaternions (k, 4) `after` (k,) s from the step, on plans or as states move."""
         moved = moved_states(self.state[rows], after + self.age[rows])
+        if self.plans:
+            ids = self.ids[rows]
+            for object_id in np.unique(ids[np.isin(ids, list(self.plans))]).tolist():
+                which, plan = np.flatnonzero(ids == object_id), self.plans[object_id]
+                planned = plan.path.rows(plan.seconds(self.stamp_ns) + after[which])
+                moved["position"][which], moved["quaternion"][which] = planned[:, :3], planned[:, 3:7]
         return moved["position"], moved["quaternion"]

@@ -24,6 +24,7 @@ _LIGHTS: Final = (("key", (-3.0, -4.0, 6.0), 1.8), ("fill", (4.0, 1.0, 2.0), 0.7
 _LINEAR: Final = np.round(255.0 * (np.arange(256) / 255.0) ** 2.2).astype(np.uint8)
 _WHITE: Final = (255, 255, 255)
 _TUBE: Final = (240, 200, 110)
+_PLAN: Final = (90, 150, 230)
 
 MOST_HIDDEN: Final = 64
 """Forms without objects that the browser keeps, because meshes come back to their poses of impact."""
@@ -56,7 +57,8 @@ class Page:
                 self._show_batch(key, batch)
             self._show_points(picture)
             self._show_lines(picture)
-            self._show_tubes(picture)
+            self._show_mesh("tubes", picture.tubes, _TUBE, 0.25)
+            self._show_mesh("plans", picture.ribbons, _PLAN, 0.4)
             self._show_labels(picture)
 
     # -- parts
@@ -140,14 +142,14 @@ class Page:
             if len(points):
                 handle.points, handle.colors = points, colors
 
-    def _show_tubes(self, picture: Picture) -> None:
-        vertices, faces = picture.tubes
-        handle = self._others.get("tubes")
-        visible = len(faces) > 0 and "tubes" not in self.hidden
+    def _show_mesh(self, name: str, mesh: tuple[Any, Any], color: tuple[int, int, int], opacity: float) -> None:
+        vertices, faces = mesh
+        handle = self._others.get(name)
+        visible = len(faces) > 0 and name not in self.hidden
         if handle is None and len(faces):
-            self._others["tubes"] = self._scene.add_mesh_simple(
-                "/tubes", vertices, faces, color=_TUBE, opacity=0.25, cast_shadow=False, receive_shadow=False,
-                visible=visible,
+            self._others[name] = self._scene.add_mesh_simple(
+                f"/{name}", vertices, faces, color=color, opacity=opacity, cast_shadow=False, receive_shadow=False,
+                side="double" if name == "plans" else "front", visible=visible,
             )  # fmt: skip
         elif handle is not None:
             handle.visible = visible

@@ -28,6 +28,7 @@ PARTS: Final = {
     "impacts": "places of impact",
     "paths": "predicted paths",
     "tubes": "tubes of uncertainty",
+    "plans": "plans that objects follow",
     "names": "labels",
     "static": "objects that do not move",
 }

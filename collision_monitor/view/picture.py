@@ -18,6 +18,7 @@ from collision_monitor.view.levels import COLORS, Level, object_levels, predicti
 from collision_monitor.view.moment import Moment
 from collision_monitor.view.pair_list import PairRow, soonest_pairs
 from collision_monitor.view.paths import paths, radii, tubes
+from collision_monitor.view.ribbons import ribbons
 
 Singles = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
@@ -58,7 +59,8 @@ class Picture:
 
     batches: by role and form. clouds: points (n, 3) of scans and maps, with their colours (n, 3) and diameter.
     contacts (c, 3): points; normals (c, 2, 3): lines, from A to B. impacts (i, 3): places of predicted collisions, with
-    colours (i, 3). paths (p, 2, 3): line segments, with colours (p, 2, 3). tubes: vertices (v, 3) and faces (f, 3).
+    colours (i, 3). paths (p, 2, 3): line segments, with colours (p, 2, 3). tubes, ribbons of plans: vertices (v, 3) and
+    faces (f, 3).
     rows: the list. is_known: whether there are answers. extent: radius of the scene. unit: size of a typical object.
     """
 
@@ -74,6 +76,7 @@ class Picture:
     paths: Singles
     path_colors: Bytes
     tubes: tuple[Singles, NDArray[np.uint32]]
+    ribbons: tuple[Singles, NDArray[np.uint32]]
     labels: list[Label]
     rows: list[PairRow]
     is_known: bool
@@ -121,6 +124,7 @@ def draw(moment: Moment, *, origin: Floats | None = None, selected: int | None =
         paths=line,
         path_colors=line_colors,
         tubes=tube,
+        ribbons=ribbons(moment, origin),
         labels=labels(moment, rows, selected, origin, extent, unit),
         rows=rows,
         is_known=moment.is_known,

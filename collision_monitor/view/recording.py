@@ -171,6 +171,8 @@ def _answered(session: Session, replay_with: Profile | str) -> Iterator[Recorded
         yield message
         if message.type == "ObjectDescriptionArray":
             pipeline.on_shapes(message.data)
+        elif message.type == "ObjectTrajectoryArray":
+            pipeline.on_trajectories(message.data)
         elif message.type == "ParameterEvent":
             pipeline.on_settings(message.data)
         elif message.type == "ObjectStateArray":

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from html import escape
+from typing import Final
 
 import numpy as np
 
 from collision_monitor.codec import MonitorStatus
 from collision_monitor.records import Phase, PredictionStatus
 from collision_monitor.view.moment import Moment
+
+NAMED: Final = 5
+"""Objects off their plans that the state names; it counts the others."""
 
 
 def state_html(title: str, moment: Moment, notes: list[str]) -> str:
@@ -24,6 +28,10 @@ def state_html(title: str, moment: Moment, notes: list[str]) -> str:
         counts.append(f"{unresolved} unresolved")
     if moment.unseen:
         counts.append(f"{moment.unseen} without a pose")
+    if moment.left_plans:
+        names = ", ".join(map(moment.name_of, sorted(moment.left_plans)[:NAMED]))
+        more = len(moment.left_plans) - NAMED
+        notes = [*notes, f"off their plans: {names}{f' and {more} more' if more > 0 else ''}"]
     if moment.bodies.boxed:
         notes = [*notes, f"{moment.bodies.boxed} shapes are drawn as their bounding boxes"]
     warned = "".join(f'<div style="color:#ff8a7a">{escape(note)}</div>' for note in notes)
@@ -49,6 +57,12 @@ def object_html(moment: Moment, object_id: int) -> str:
         else:
             lines.append(f"{np.linalg.norm(state['linear']):.2f} m/s, {np.linalg.norm(state['angular']):.2f} rad/s")
             lines.append(f"last state {moment.age[row]:.2f} s old")
+            if object_id in moment.plans:
+                plan = moment.plans[object_id]
+                left = float(plan.path.times[-1]) - plan.seconds(moment.stamp_ns)
+                lines.append(f"follows its plan, which ends in {max(left, 0.0):.1f} s")
+            elif object_id in moment.left_plans:
+                lines.append("has left its plan")
         if body.padding:
             lines.append(f"padding {body.padding:g} m, which is not drawn")
     return (

@@ -26,11 +26,13 @@ from collision_monitor.codec import (
     decode_predictions,
     decode_states,
     decode_status,
+    decode_trajectories,
 )
 from collision_monitor.codec.alerts import AlertLevel
 from collision_monitor.codec.states import COVARIANCE_SIZE
 from collision_monitor.monitor.state.timeline import NANOSECOND
 from collision_monitor.pipeline.catalogue import Catalogue
+from collision_monitor.pipeline.followed_plans import FollowedPlans
 from collision_monitor.pipeline.settings_event import RULES
 from collision_monitor.records import StateFlag
 from collision_monitor.shapes.pose import shortest_turns
@@ -73,6 +75,7 @@ class TopicContent:
         self._newest = 0
         self._contacts: ContactArray | None = None
         self._predictions: PredictedCollisionArray | None = None
+        self._plans = FollowedPlans()
 
     def take(self, kind: str, data: bytes) -> None:
         """Take a message. kind: its type, such as `ContactArray`; others are ignored. Raises MessageError."""
@@ -81,6 +84,10 @@ class TopicContent:
                 self._describe(decode_descriptions(data))
             case "ObjectStateArray":
                 self._move(decode_states(data))
+            case "ObjectTrajectoryArray":
+                plans = decode_trajectories(data)
+                if self._is_ours(plans.frame_id):
+                    self._plans.take(plans)
             case "ContactArray":
                 contacts = decode_contacts(data)
                 if self._contacts is not None and contacts.stamp_ns < self._contacts.stamp_ns:
@@ -107,6 +114,7 @@ class TopicContent:
         other = copy.copy(self)
         other._state, other._stamp = self._state.copy(), self._stamp.copy()
         other._removed, other._raised = set(self._removed), dict(self._raised)
+        other._plans = self._plans.copy()
         return other
 
     def moment(self) -> Moment:
@@ -132,6 +140,8 @@ class TopicContent:
             step=0 if last is None else last.step,
             is_known=contacts is not None and predictions is not None,
             alerts=self._alerts(stamp),
+            plans={id_: each for id_, each in self._plans.plans.items() if each.ends_ns >= stamp},
+            left_plans=frozenset(self._plans.left),
         )
         if contacts is not None:
             moment = replace(moment, contacts=contacts.contacts)
@@ -171,6 +181,7 @@ class TopicContent:
             self._catalogue.apply(change)
             if isinstance(change, Removal):
                 self._removed.add(change.object_id)
+                self._plans.forget([change.object_id])
                 self._pieces.pop(change.object_id, None)
             else:
                 self._pieces[change.object_id] = described_pieces(change)
@@ -219,12 +230,14 @@ class TopicContent:
         elapsed = np.where(before == _NEVER, np.inf, (message.stamp_ns - np.maximum(before, 0)) * NANOSECOND)
         _estimate_twists(states, self._state[at], elapsed)
         self._state[at], self._stamp[at] = states, message.stamp_ns
+        self._plans.move(message.stamp_ns, states)
 
     def _set_back(self, stamp_ns: int) -> None:
         """Follow the monitor, which has accepted an earlier clock: states from that time on are new."""
         moving = ~self._bodies.static & (self._stamp != _NEVER)
         self._stamp[moving] = np.minimum(self._stamp[moving], stamp_ns)
         self._newest = stamp_ns
+        self._plans.restart()
 
 
 def _copied(catalogue: Catalogue) -> Catalogue:

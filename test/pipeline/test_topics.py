@@ -31,6 +31,7 @@ def test_all_is_recorded_but_a_picture_and_what_other_messages_tell() -> None:
         Topic.RAISED_ALERTS,
         Topic.MONITORED_SHAPES,
         Topic.MONITORED_STATES,
+        Topic.MONITORED_PLANS,
     }
 
 

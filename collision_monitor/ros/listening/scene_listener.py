@@ -14,8 +14,8 @@ from collision_monitor.ros.endpoints import subscription
 from collision_monitor.ros.names import check_node_name
 
 TOPICS: Final = (
-    *(Topic.MONITORED_SHAPES, Topic.MONITORED_STATES, Topic.CONTACTS, Topic.PREDICTIONS, Topic.RAISED_ALERTS),
-    Topic.STATUS,
+    *(Topic.MONITORED_SHAPES, Topic.MONITORED_STATES, Topic.MONITORED_PLANS, Topic.CONTACTS, Topic.PREDICTIONS),
+    *(Topic.RAISED_ALERTS, Topic.STATUS),
 )
 
 

@@ -245,6 +245,7 @@ class Monitoring:
     def _on_trajectories(self, data: bytes) -> None:
         received = self._now()
         self._pipeline.on_trajectories(data)
+        self._monitored.follow(data)
         self._recording.write(Topic.TRAJECTORIES, data, received, received)
         self._refusals.report(self._plans_in, time.monotonic_ns())
 

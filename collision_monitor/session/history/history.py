@@ -73,6 +73,21 @@ class UnmonitoredSpan:
 
 
 @dataclass
+class PlanUse:
+    """The plans of one object. count: of them. left (s): when it left one, from the first step; times_left: how often.
+
+    ways: points (n, 3) of the last ones, in m. left_steps: indices of the steps of `left`.
+    """
+
+    object_id: int
+    count: int = 0
+    times_left: int = 0
+    ways: list[Floats] = field(default_factory=list)
+    left_steps: list[int] = field(default_factory=list)
+    left: list[float] = field(default_factory=list)
+
+
+@dataclass
 class History:
     """A session, from its first step to its last.
 
@@ -82,8 +97,8 @@ class History:
     (s). objects: by id, as described last; names: all names that occurred, with their ids. profile: at the start;
     settings: the changed ones, with the time (s) of the first step that used them. alerts: the changes of alerts, with
     their times (s); rules: those at the start, or those that replace them. unmonitored: what was asked for and not
-    there, by begin. durations: step times (s), as far as
-    they were reported or measured. status: the last one, or the replay's. problems: why some of it may be unknown.
+    there, by begin. plans: of the objects that had some, by id. durations: step times (s), as far as they were reported
+    or measured. status: the last one, or the replay's. problems: why some of it may be unknown.
     """
 
     name: str
@@ -106,6 +121,7 @@ class History:
     alerts: list[tuple[float, CollisionAlert]] = field(default_factory=list)
     rules: Rules = field(default_factory=Rules)
     unmonitored: list[UnmonitoredSpan] = field(default_factory=list)
+    plans: list[PlanUse] = field(default_factory=list)
     status: MonitorStatus | None = None
     problems: list[str] = field(default_factory=list)
     collisions: list[CollisionEvent] = field(default_factory=list)

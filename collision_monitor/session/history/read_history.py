@@ -23,6 +23,7 @@ from collision_monitor.codec import (
     decode_predictions,
     decode_states,
     decode_status,
+    decode_trajectories,
 )
 from collision_monitor.errors import MessageError, SessionError
 from collision_monitor.monitor.state.timeline import NANOSECOND
@@ -32,6 +33,7 @@ from collision_monitor.pipeline.topics import Topic
 from collision_monitor.session.history.collisions import find_collisions
 from collision_monitor.session.history.growing_rows import GrowingRows
 from collision_monitor.session.history.history import History, Records
+from collision_monitor.session.history.plan_rows import PlanRows
 from collision_monitor.session.history.unmonitored_rows import UnmonitoredRows
 from collision_monitor.session.mcap.layout import SEQUENCE_MASK
 from collision_monitor.session.mcap.rosbag2 import INPUT_TYPES
@@ -88,6 +90,7 @@ class _Gathered:
         self._durations: list[float] = []
         self._alerts: list[tuple[int, CollisionAlert]] = []  # index of the step
         self._unmonitored = UnmonitoredRows()
+        self._plans = PlanRows()
 
     def take(self, message: Recorded) -> None:
         missing = (message.sequence - self._count) & SEQUENCE_MASK
@@ -111,8 +114,12 @@ class _Gathered:
                     if not isinstance(each, Removal):
                         self._history.objects[each.object_id] = each
                         self._history.names.setdefault(each.name, set()).add(each.object_id)
-            case "ObjectTrajectoryArray" if self._pipeline is not None:
-                self._pipeline.on_trajectories(message.data)
+            case "ObjectTrajectoryArray":
+                if self._pipeline is not None:
+                    self._pipeline.on_trajectories(message.data)
+                plans = decode_trajectories(message.data)
+                if plans.frame_id in ("", self._session.frame_id):
+                    self._plans.take(plans)
             case "ParameterEvent" if self._changes:
                 if self._pipeline is not None:
                     self._pipeline.on_settings(message.data)
@@ -120,6 +127,7 @@ class _Gathered:
                 if not changed.keys() <= {LIMIT, NOW}:  # these only record what the clock made of a step
                     self._settings.append((len(self._steps), changed))
             case "ObjectStateArray":
+                step = len(self._steps)
                 if self._pipeline is not None:
                     begin = time.perf_counter()
                     outputs = self._pipeline.on_states(message.data)
@@ -129,14 +137,14 @@ class _Gathered:
                 states = decode_states(message.data)
                 if states.frame_id in ("", self._session.frame_id):
                     self._states.append(states.stamp_ns, states.states)
+                    self._plans.move(states.stamp_ns, states.states, step)
                     self._next_step.append(len(self._steps))
             case "ContactArray" if answers:
                 contacts = decode_contacts(message.data)
                 self._take_contacts(self._step(contacts.stamp_ns, contacts.step), contacts.contacts)
             case "PredictedCollisionArray" if answers:
                 predictions = decode_predictions(message.data)
-                step = self._step(predictions.stamp_ns, predictions.step)
-                self._predictions.append(step, predictions.predictions)
+                self._predictions.append(self._step(predictions.stamp_ns, predictions.step), predictions.predictions)
             case "CollisionAlert" if answers:
                 self._take_alert(decode_alert(message.data))
             case "DiagnosticArray" if message.topic.endswith(f"/{Topic.SOURCES.path}"):
@@ -163,6 +171,8 @@ class _Gathered:
     def _step(self, stamp_ns: int, number: int) -> int:
         """Return the index of the step with this number. Contacts and predictions of one step share it."""
         if number not in self._step_of:
+            if self._steps and stamp_ns < self._steps[-1]:
+                self._plans.restart()
             self._step_of[number] = len(self._steps)
             self._steps.append(stamp_ns)
         return self._step_of[number]
@@ -186,6 +196,7 @@ class _Gathered:
         h.state_time = np.asarray((stamps_of - h.begin_ns) * NANOSECOND, np.float64)
         h.durations = np.array(self._durations)
         h.alerts = [(float(h.times[step]), alert) for step, alert in self._alerts]
+        h.plans = self._plans.uses(h.times)
         h.unmonitored = self._unmonitored.spans(h.begin_ns)
         h.settings = [(float(h.times[k]), changed) for k, changed in self._settings if k < len(stamps)]
         if self._pipeline is not None:

@@ -28,7 +28,7 @@ from collision_monitor.sources.ground.yaml_table import number, table, text
 HEADER, RECEIVED = "header", "received"
 
 SECTIONS: Final[tuple[str, ...]] = ("robots", "plans")
-"""Sections with sources of their own; `kinds.SECTIONS` reads them."""
+"""Sections with sources of their own; `kinds.beside_topics` reads them."""
 
 _TOP: Final = ("frame", "stamps", "rate", "step", "max_age", "objects", *SECTIONS)
 

@@ -11,9 +11,11 @@ from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Shape
+from collision_monitor.sources.ground.motion_models import AS_USUAL, MotionChoice, read_motion
+from collision_monitor.sources.ground.schedule import Schedule, read_schedule
 from collision_monitor.sources.ground.yaml_table import SHAPES, known, number, pose, shape, table, text, truth
 
-PLACE: Final = ("topic", "type", "frame", "marker", "static", "pose")
+PLACE: Final = ("topic", "type", "frame", "marker", "static", "pose", "schedule")
 BODY: Final = ("shape", "shapes", "each", "id", "padding", "group", "mask", "allowed")
 NUMBERS: Final = {
     "forget_after": ("s", 1.0),
@@ -31,7 +33,7 @@ NUMBERS: Final = {
 }
 """Keys with a number, their units and defaults."""
 
-KEYS: Final = (*PLACE, *BODY, "covariance", "without", "nan_is_free", *NUMBERS)
+KEYS: Final = (*PLACE, *BODY, "covariance", "without", "nan_is_free", "motion", "acceleration", "paths", *NUMBERS)
 
 
 @dataclass(frozen=True)
@@ -42,8 +44,9 @@ class ObjectEntry:
     markers of the namespace. shapes: empty if the messages hold them. each: the shape of each object of a
     group, in place of those in the messages. pose: of a static object, in `frame` (empty: the
     monitor's). covariance: whether covariances in the messages are used. without: names of the objects
-    whose points a scan leaves out. nan_is_free: whether its NaN mean that nothing is there. given: the keys that the
-    file holds. The numbers are those of NUMBERS.
+    whose points a scan leaves out. nan_is_free: whether its NaN mean that nothing is there. motion: how the objects
+    move on from their states. schedule: where the object is when, declared. paths: which predicted paths count. given:
+    the keys that the file holds. The numbers are those of NUMBERS.
     """
 
     name: str
@@ -76,6 +79,9 @@ class ObjectEntry:
     clearance: float = 0.0
     without: tuple[str, ...] = ()
     nan_is_free: bool = False
+    motion: MotionChoice = AS_USUAL
+    schedule: Schedule | None = None
+    paths: str = "all"
     given: tuple[str, ...] = ()
 
     def describe(
@@ -109,7 +115,7 @@ class ObjectEntry:
     def allow_only(self, keys: Collection[str], message_type: str) -> None:
         """Check that the file holds no key for this entry that its type of messages does not use."""
         for key in self.given:
-            if key not in ("topic", "type", *(set(BODY) - {"each"}), *keys):
+            if key not in ("topic", "type", "schedule", *(set(BODY) - {"each"}), *keys):
                 used = ", ".join(sorted({*keys, "shape", "padding", "group", "mask", "allowed"}))
                 raise InputError(f"{self.name}, {key}: {message_type} does not use it; it uses {used}")
 
@@ -148,13 +154,15 @@ def _entry(name: str, content: dict[str, Any], object_id: int) -> ObjectEntry:
     stands_at = pose(content["pose"], f"{name}, pose") if "pose" in content else None
     if marker is not None and not topic:
         raise InputError(f"{name}, topic: expected the topic of the markers, got none")
+    if "schedule" in content and (static or marker is not None or not _shapes_given(name, content)):
+        raise InputError(f"{name}, schedule: expected one of a single object with a `shape`, which is not static")
     if static and marker is None:
         if topic:
             raise InputError(f"{name}: a static object stands at its `pose` in its `frame`; expected no topic")
         if not _shapes_given(name, content):
             raise InputError(f"{name}, shape: expected one of {', '.join(SHAPES)}, got none")
-    elif not topic:
-        raise InputError(f"{name}, topic: expected the topic of its pose, or `static: true`, got none")
+    elif not topic and "schedule" not in content:
+        raise InputError(f"{name}, topic: expected the topic of its pose, `static: true` or `schedule`, got none")
     elif stands_at is not None:
         raise InputError(f"{name}, pose: expected one of static objects only; `at` places a shape in its object")
     allowed, without = content.get("allowed", []), content.get("without", [])
@@ -182,6 +190,9 @@ def _entry(name: str, content: dict[str, Any], object_id: int) -> ObjectEntry:
         without=tuple(map(str, without)),
         covariance=truth(content.get("covariance", True), f"{name}, covariance"),
         nan_is_free=truth(content.get("nan_is_free", False), f"{name}, nan_is_free"),
+        motion=read_motion(content, name),
+        paths=text(content.get("paths", "all"), f"{name}, paths"),
+        schedule=read_schedule(content["schedule"], name) if "schedule" in content else None,
         given=tuple(content),
         **values,
     )

@@ -5,7 +5,7 @@ states in the monitor's frame. The `Feed` gives it the messages, decides when a 
 ObjectDescriptionArray and ObjectStateArray bytes. Neither knows whether a message came from DDS or from a bag.
 
 A further kind of source is one class with these members, and one line in `kinds.py`: in `BY_TYPE` if an entry of
-`objects:` uses it, by the type of its topic; in `SECTIONS` if it has a section of the sources file of its own.
+`objects:` uses it, by the type of its topic; in `_SECTIONS` if it has a section of the sources file of its own.
 """
 
 from __future__ import annotations

@@ -124,13 +124,13 @@ class SourceScene:
         covariance: Floats | None = None,
         *,
         window: float = 0.0,
-        turns: bool = False,
+        turns: bool | NDArray[np.bool_] = False,
     ) -> None:
         """Write states (N,) of records.STATE in the monitor's frame, of described objects, each id once.
 
         line: the key in the sources file. covariance (N, 12): as in ObjectStateArray, or None. Where
         StateFlag.TWIST_UNKNOWN is set, the twist is estimated over the last `window` (s) of poses; 0: from the last
-        two. turns: whether the twists are constant along the axes of the bodies, and so turn with them.
+        two. turns: whether the twists are constant along the axes of the bodies, and so turn with them; also (N,).
         """
         self.line_states[line] += len(states)
         names = [self._name(object_id) for object_id in states["id"].tolist()]

@@ -53,7 +53,7 @@ class WaitingStates:
         self._turns = np.zeros(0, np.bool_)
 
     def put(
-        self, states: States, stamp_ns: int, covariance: Floats | None, window: float, *, turns: bool = False
+        self, states: States, stamp_ns: int, covariance: Floats | None, window: float, *, turns: Any = False
     ) -> None:
         """Store states (N,), each id once, unless a newer one waits. window, turns: as in `SourceScene.observe`."""
         slots = self._slots_of(states["id"].tolist())
@@ -61,22 +61,28 @@ class WaitingStates:
         if newer.any():
             slots, states = slots[~newer], states[~newer]
             covariance = None if covariance is None else covariance[~newer]
+            turns = np.broadcast_to(turns, len(newer))[~newer]
         self._states[slots] = self._twists.completed(states, slots, stamp_ns, window)
         self._stamps[slots] = stamp_ns
         self._covariances[slots] = np.nan if covariance is None else covariance
         self._waits[slots] = self._seen[slots] = True
         self._turns[slots] = turns
 
-    def pose(self, object_id: int, stamp_ns: int) -> Pose | None:
-        """Return the pose of an object at a stamp, from its last state; None if that is missing or too old."""
+    def state(self, object_id: int, stamp_ns: int) -> Any:
+        """Return the state of an object (records.STATE) at a stamp, from its last one; None if missing or too old."""
         slot = self._slots.get(object_id)
         if slot is None or not self._seen[slot]:
             return None
         if abs(stamp_ns - int(self._stamps[slot])) > self._max_age / NANOSECOND:
             return None
         (state,) = self._step(stamp_ns, np.array([slot]), estimated=True).states
+        return state
+
+    def pose(self, object_id: int, stamp_ns: int) -> Pose | None:
+        """Return the pose of an object at a stamp, from its last state; None if that is missing or too old."""
+        state = self.state(object_id, stamp_ns)
         try:
-            return Pose(state["position"], state["quaternion"])
+            return None if state is None else Pose(state["position"], state["quaternion"])
         except PoseError:  # it is refused when it reaches the monitor
             return None
 

@@ -12,13 +12,16 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.codec.trajectories import ObjectTrajectory, Then
 from collision_monitor.errors import InputError
 from collision_monitor.records import StateFlag
+from collision_monitor.robots.link_plans import radius_of
 from collision_monitor.shapes.pose import Pose, rotation_matrix
 from collision_monitor.shapes.registry import Box
 from collision_monitor.sources.ground.covariances import usable_blocks, yaw_alone
-from collision_monitor.sources.ground.frames import IDENTITY, frame_name
+from collision_monitor.sources.ground.frames import IDENTITY, FrameMotion, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
+from collision_monitor.sources.ground.motion_models import ARC, PEOPLE, MotionModels
 from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.prisms import covering_prism, load_prisms
 from collision_monitor.sources.ground.scene_states import carry_states, empty_states, turn_twists, turned_triangles
@@ -34,7 +37,16 @@ from collision_monitor.sources.ground.track_shapes import (
     with_extent,
 )
 from collision_monitor.sources.ground.tracks import DescribedTrack, TrackTable
+from collision_monitor.sources.ground.yaml_table import known
 from collision_monitor.sources.messages.autoware_bytes import POLYGON, TrackArrays
+from collision_monitor.sources.plans.predicted_paths import (
+    IGNORED,
+    LIKELIEST,
+    PATHS,
+    TOLERANCE,
+    PathPlan,
+    plan_of_paths,
+)
 
 TRACKED: Final = "autoware_perception_msgs/msg/TrackedObjects"
 PREDICTED: Final = "autoware_perception_msgs/msg/PredictedObjects"
@@ -46,6 +58,9 @@ _LABELS: Final = (
     *("unknown", "car", "truck", "bus", "trailer", "motorcycle", "bicycle", "pedestrian", "animal", "hazard"),
     *("over_drivable", "under_drivable"),
 )
+_NO_PLAN: Final = PathPlan(np.zeros(0), np.zeros((0, 7)), 0.0)
+_NO_TWISTS: Final = np.zeros((0, 6))
+_VEHICLES: Final = ("car", "truck", "bus", "trailer", "motorcycle", "bicycle")
 
 
 Found = tuple[DescribedTrack, int]
@@ -56,13 +71,20 @@ class AutowareSource(Source):
     """The tracks of one entry, with the shapes in the messages or with the entry's `each`."""
 
     def __init__(self, entry: ObjectEntry, message_type: str, mapping: Mapping) -> None:
-        entry.allow_only(("covariance", "forget_after", "min_existence", "shape_tolerance", "each"), message_type)
+        keys = ["covariance", "forget_after", "min_existence", "shape_tolerance", "each", "motion", "acceleration"]
+        if message_type == PREDICTED:
+            keys.append("paths")
+            known(entry.paths, PATHS, f"{entry.name}, paths")
+        entry.allow_only(keys, message_type)
         if entry.shapes:
             raise InputError(f"{entry.name}, shape: {message_type} holds many objects; `each` is the shape of each")
         self.name, self.topics = entry.name, {entry.topic: (message_type,)}
         self._entry = entry
         self._tracks = TrackTable(entry.name, entry.forget_after)
+        self._models = MotionModels(entry.name, entry.motion, PEOPLE, _LABELS, dict.fromkeys(_VEHICLES, ARC))
         self._number = 0
+        self._with_plans: set[int] = set()
+        self._radius = radius_of(entry.each) if entry.each else 0.0
         load_prisms()
         self._heard_ns = 0  # stamp of the last message: a tracker that is silent does not say that a track is gone
 
@@ -88,7 +110,41 @@ class AutowareSource(Source):
         if kept:
             states, covariance = self._states(kept, content, scene)
             given = covariance if frame is IDENTITY else carry_states(states, frame, covariance)
-            scene.observe(entry.name, states, stamp_ns, given, turns=True)
+            words = [_word(content.labels[row]) for _, row in kept]
+            turns = self._models.apply(states, words, scene.horizon)
+            scene.observe(entry.name, states, stamp_ns, given, turns=turns)
+            if content.paths and entry.paths != IGNORED:
+                self._follow(kept, content, frame, stamp_ns, scene)
+
+    def _follow(
+        self, kept: list[Found], content: TrackArrays, frame: FrameMotion, stamp_ns: int, scene: SourceScene
+    ) -> None:
+        """Let the tracks follow their predicted paths, and end the plans of those that have none."""
+        plans = []
+        for track, row in kept:
+            radius = self._radius or float(np.linalg.norm(content.size[row])) / 2.0
+            if row in content.footprints:
+                radius = max(radius, float(np.linalg.norm(content.footprints[row], axis=1).max()))
+            plan = None
+            with scene.guard(self.name, track.name):
+                plan = plan_of_paths(
+                    content.paths[row], scene.horizon, radius, alone=self._entry.paths == LIKELIEST
+                )
+            times, poses, tube = plan or _NO_PLAN
+            if plan is None and track.object_id not in self._with_plans:
+                continue
+            if len(times) and frame is not IDENTITY:
+                rows = empty_states([track.object_id] * len(times))
+                rows["position"], rows["quaternion"] = poses[:, :3], poses[:, 3:]
+                carry_states(rows, frame, None)
+                poses = np.concatenate([rows["position"], rows["quaternion"]], axis=1)
+            (self._with_plans.discard if plan is None else self._with_plans.add)(track.object_id)
+            plans.append(
+                ObjectTrajectory(
+                    times, poses, _NO_TWISTS, np.array(TOLERANCE), track.object_id, then=Then.GO_ON, tube=tube
+                )
+            )
+        scene.follow(plans, stamp_ns)
 
     def settle(self, now_ns: int, scene: SourceScene) -> None:
         """See Source."""
@@ -97,13 +153,13 @@ class AutowareSource(Source):
     def restart(self, now_ns: int, scene: SourceScene) -> None:
         """See Source."""
         self._tracks.restart(now_ns)
+        self._with_plans.clear()
         self._heard_ns = now_ns
 
     def _track(self, key: bytes, label: int, stamp_ns: int, scene: SourceScene) -> DescribedTrack | None:
         if key not in self._tracks:
             self._number += 1
-        word = _LABELS[label] if label < len(_LABELS) else f"label{label}"
-        return self._tracks.get(key, f"{self._entry.name}_{word}_{self._number}", stamp_ns, scene)
+        return self._tracks.get(key, f"{self._entry.name}_{_word(label)}_{self._number}", stamp_ns, scene)
 
     def _described(self, found: list[Found], content: TrackArrays, scene: SourceScene) -> list[Found]:
         """Describe the tracks that are new or have left their described shapes. Return those that are described."""
@@ -156,7 +212,7 @@ class AutowareSource(Source):
         states["position"], states["quaternion"] = poses[:, :3], poses[:, 3:]
         states["quaternion"][content.orientation[rows] == _NO_ORIENTATION] = 0.0, 0.0, 0.0, 1.0
         states["linear"], states["angular"], states["acceleration"] = twists[:, :3], twists[:, 3:], acceleration
-        states["flags"][acceleration.any(1)] = StateFlag.ACCELERATION_VALID | StateFlag.STOPS
+        states["flags"][acceleration.any(1)] = StateFlag.ACCELERATION_VALID
         covariance = self._covariances(states, content, rows, scene) if self._entry.covariance else None
         turn_twists(states)
         return states, covariance
@@ -177,6 +233,11 @@ class AutowareSource(Source):
             return None
         joined[:, 6:] = turned_triangles(rotation_matrix(states["quaternion"]), joined)[:, 6:]
         return joined
+
+
+def _word(label: int) -> str:
+    """Return the class of a label."""
+    return _LABELS[label] if label < len(_LABELS) else f"label{label}"
 
 
 def _measured(content: TrackArrays) -> tuple[NDArray[np.uint8], NDArray[np.float64]]:

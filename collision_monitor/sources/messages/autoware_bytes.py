@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from collision_monitor.codec.cdr import ENCAPSULATION, Reader
 from collision_monitor.errors import MessageError
+from collision_monitor.sources.plans.predicted_paths import PredictedPath
 
 Floats = NDArray[np.float64]
 
@@ -36,6 +37,7 @@ _LEAST: Final = 16 + 8 + 8 * _KINEMATICS + 8 + 24
 """Bytes of the smallest object."""
 
 _HEAD, _U4, _U1F4 = struct.Struct("<fI"), struct.Struct("<I"), struct.Struct("<B3xf")
+_STEP: Final = struct.Struct("<lLf")
 _POSE: Final = 56
 
 
@@ -58,7 +60,7 @@ class TrackArrays:
     """The objects of a message: N rows each, in the frame of the header; twists along the axes of the objects.
 
     pose (N, 7), twist (N, 6), acceleration (N, 3); their covariances (N, 36). orientation: 0 if not available.
-    kind and size (N, 3): the shape; footprints: the corners (n, 3) of the polygons, by row.
+    kind and size (N, 3): the shape; footprints: the corners (n, 3) of the polygons, by row. paths: the predicted ones.
     """
 
     header: Header
@@ -75,6 +77,7 @@ class TrackArrays:
     kind: NDArray[np.uint8]
     size: Floats
     footprints: dict[int, Floats]
+    paths: dict[int, list[PredictedPath]]
 
 
 def read_tracks(data: bytes, predicted: bool) -> TrackArrays:
@@ -88,7 +91,7 @@ def read_tracks(data: bytes, predicted: bool) -> TrackArrays:
     at = len(body) - reader.remaining
     starts = np.empty((count, 4), np.int64)  # of the UUID, the kinematics, the shape, the size
     labels, existence = [], []
-    footprints = {}
+    footprints, paths = {}, {}
     try:
         for k in range(count):
             starts[k, 0], at = at, _aligned(at + 16, 4)
@@ -98,7 +101,10 @@ def read_tracks(data: bytes, predicted: bool) -> TrackArrays:
             labels.append(_likeliest(body, at, classes))
             starts[k, 1] = at = _aligned(at + 8 * classes, 8)
             at += 8 * _KINEMATICS
-            at = _behind_paths(body, at) if predicted else at + 2
+            if predicted:
+                paths[k], at = _read_paths(body, at)
+            else:
+                at += 2
             starts[k, 2], at = at, _aligned(at + 1, 4)
             (corners,) = _U4.unpack_from(body, at)
             at += 4
@@ -131,6 +137,7 @@ def read_tracks(data: bytes, predicted: bool) -> TrackArrays:
         kind=raw[starts[:, 2]],
         size=numbers[starts[:, 3, None] // 8 + np.arange(3)],
         footprints=footprints,
+        paths=paths,
     )
 
 
@@ -146,15 +153,19 @@ def _likeliest(body: Any, at: int, classes: int) -> int:
     return int(max(found, key=lambda each: each[1] if each[1] >= 0.0 else -1.0)[0]) if found else 0
 
 
-def _behind_paths(body: Any, at: int) -> int:
-    """Return the offset behind predicted paths, which are not used."""
-    (paths,) = _U4.unpack_from(body, at)
+def _read_paths(body: Any, at: int) -> tuple[list[PredictedPath], int]:
+    """Return the predicted paths of an object, and the offset behind them."""
+    (count,) = _U4.unpack_from(body, at)
     at += 4
-    if paths > len(body) // 16:
+    if count > len(body) // 16:
         raise ValueError
-    for _ in range(paths):
+    found = []
+    for _ in range(count):
         at = _aligned(at, 4)
         (poses,) = _U4.unpack_from(body, at)
-        at = _aligned(at + 4, 8) + _POSE * poses if poses else at + 4
-        at += 12
-    return at
+        at = _aligned(at + 4, 8) if poses else at + 4
+        rows = np.frombuffer(body, "<f8", 7 * poses, at if poses else 0).reshape(-1, 7)
+        sec, nanosec, confidence = _STEP.unpack_from(body, at + _POSE * poses)
+        found.append(PredictedPath(confidence, sec + 1e-9 * nanosec, rows))
+        at += _POSE * poses + 12
+    return found, at

@@ -18,6 +18,7 @@ from collision_monitor.shapes.registry import Box, Shape
 from collision_monitor.sources.ground.covariances import usable_blocks
 from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
+from collision_monitor.sources.ground.motion_models import STRAIGHT, MotionModels
 from collision_monitor.sources.ground.nearest_tracks import assigned, load_assignment
 from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.scene_states import carry_states, empty_states
@@ -55,11 +56,12 @@ class DetectionSource(Source):
 
     def __init__(self, entry: ObjectEntry, message_type: str, mapping: Mapping) -> None:
         keys = ("covariance", "forget_after", "min_existence", "shape_tolerance", "position_stddev", "estimate_over")
-        entry.allow_only((*keys, "each", "gate"), message_type)
+        entry.allow_only((*keys, "each", "gate", "motion"), message_type)
         if entry.shapes:
             raise InputError(f"{entry.name}, shape: {message_type} holds many objects; `each` is the shape of each")
         self.name, self.topics = entry.name, {entry.topic: (message_type,)}
         self._entry = entry
+        self._models = MotionModels(entry.name, entry.motion, STRAIGHT, classes=None)
         self._tracks = TrackTable(entry.name, entry.forget_after)
         self._last: dict[Key, tuple[int, Floats, Floats]] = {}  # stamp, position, velocity
         self._number = 0
@@ -100,7 +102,9 @@ class DetectionSource(Source):
                 kept.append(k)
                 self._note(key, states["position"][k], stamp_ns)
         if kept:
-            scene.observe(entry.name, states[kept], stamp_ns, window=entry.estimate_over or WINDOW)
+            states = states[kept]
+            turns = self._models.apply(states, [_class(found[k]) for k in kept], scene.horizon)
+            scene.observe(entry.name, states, stamp_ns, window=entry.estimate_over or WINDOW, turns=turns)
 
     def settle(self, now_ns: int, scene: SourceScene) -> None:
         """See Source."""

@@ -18,6 +18,7 @@ from collision_monitor.errors import CollisionMonitorError, InputError, ShapeErr
 from collision_monitor.records import StateFlag
 from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
+from collision_monitor.sources.ground.motion_models import STRAIGHT, MotionModels
 from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.prisms import covering_prism, load_prisms
 from collision_monitor.sources.ground.scene_states import carry_states, empty_states
@@ -37,11 +38,12 @@ class FootprintSource(Source):
     """The object of one entry: a prism of the entry's `height` over the footprint, or a polygon of a plane scene."""
 
     def __init__(self, entry: ObjectEntry, message_type: str, mapping: Mapping) -> None:
-        entry.allow_only(("height", "shape_tolerance", "position_stddev", "estimate_over"), message_type)
+        entry.allow_only(("height", "shape_tolerance", "position_stddev", "estimate_over", "motion"), message_type)
         if entry.shapes:
             raise InputError(f"{entry.name}, shape: {message_type} brings its own; `height` makes it a prism")
         self.name, self.topics = entry.name, {entry.topic: (message_type,)}
         self._entry = entry
+        self._models = MotionModels(entry.name, entry.motion, STRAIGHT)
         self._corners: Floats | None = None  # (n, 2), in the object's frame
         self._span = np.zeros(2)  # lowest and highest corner in it, if they are not of one height
         load_prisms()
@@ -77,7 +79,8 @@ class FootprintSource(Source):
         states["position_stddev"] = entry.position_stddev
         if frame is not IDENTITY:
             carry_states(states, frame, None)
-        scene.observe(entry.name, states, stamp_ns, window=entry.estimate_over)
+        turns = self._models.apply(states, ("",), scene.horizon)
+        scene.observe(entry.name, states, stamp_ns, window=entry.estimate_over, turns=turns)
 
     def _extent(self, heights: Floats) -> Floats:
         """Return the lowest and the highest of heights (n,) about their mean; zeros where they are one height."""

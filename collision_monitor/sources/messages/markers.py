@@ -15,6 +15,7 @@ from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Box, Cylinder, Shape, Sphere
 from collision_monitor.sources.ground.frames import IDENTITY, FrameMotion, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
+from collision_monitor.sources.ground.motion_models import STRAIGHT, MotionModels
 from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.scene_states import carry_states, empty_states
 from collision_monitor.sources.ground.source import Source
@@ -49,9 +50,11 @@ class MarkerSource(Source):
             raise InputError(
                 f"{entry.name}: {entry.topic} is a {message_type}; expected `marker: {{ns: …, id: …}}` in the mapping"
             )
-        entry.allow_only(("marker", "static", "forget_after", "position_stddev", "estimate_over"), message_type)
+        keys = ("marker", "static", "forget_after", "position_stddev", "estimate_over", "motion")
+        entry.allow_only(keys, message_type)
         self.name, self.topics = entry.name, {entry.topic: (message_type,)}
         self._entry = entry
+        self._models = MotionModels(entry.name, entry.motion, STRAIGHT)
         self._namespace, self._only = entry.marker
         before = mapping.topics[entry.topic]
         taken = [each.marker for each in before[: before.index(entry)] if each.marker is not None]
@@ -153,7 +156,9 @@ class MarkerSource(Source):
         if kept and not entry.static:
             states["flags"] = StateFlag.TWIST_UNKNOWN
             states["position_stddev"] = entry.position_stddev
-            scene.observe(entry.name, states[kept], stamp_ns, window=entry.estimate_over)
+            states = states[kept]
+            turns = self._models.apply(states, ("",) * len(states), scene.horizon)
+            scene.observe(entry.name, states, stamp_ns, window=entry.estimate_over, turns=turns)
 
     def _marker_name(self, number: int) -> str:
         return f"{self.name}_{number}" if self._only is None else self.name

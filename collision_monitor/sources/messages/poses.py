@@ -12,6 +12,7 @@ from collision_monitor.shapes.pose import rotation_matrix
 from collision_monitor.sources.ground.covariances import Blocks, usable_blocks, yaw_alone
 from collision_monitor.sources.ground.frames import IDENTITY, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
+from collision_monitor.sources.ground.motion_models import ARC, STRAIGHT, MotionModels
 from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.scene_states import (
     carry_states,
@@ -33,10 +34,11 @@ class PoseSource(Source):
     """The object of one entry. Odometry holds its twist along the axes of `child_frame_id`, which is the body's."""
 
     def __init__(self, entry: ObjectEntry, message_type: str, mapping: Mapping) -> None:
-        entry.allow_only(("covariance", "position_stddev", "estimate_over"), message_type)
+        entry.allow_only(("covariance", "position_stddev", "estimate_over", "motion"), message_type)
         require_shape(entry)
         self.name, self.topics = entry.name, {entry.topic: (message_type,)}
         self._entry = entry
+        self._models = MotionModels(entry.name, entry.motion, ARC if message_type == ODOMETRY else STRAIGHT)
 
     def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
         """See Source."""
@@ -77,9 +79,8 @@ class PoseSource(Source):
             given = None
         if frame is not IDENTITY:
             given = carry_states(states, frame, given)
-        scene.observe(
-            entry.name, states, stamp_ns, given, window=entry.estimate_over, turns=twist is not None
-        )
+        turns = self._models.apply(states, ("",), scene.horizon)
+        scene.observe(entry.name, states, stamp_ns, given, window=entry.estimate_over, turns=turns)
 
     def _blocks(self, part: Any, what: str, scene: SourceScene) -> Blocks:
         found = usable_blocks(np.asarray(part.covariance, np.float64).reshape(1, 36))

@@ -7,6 +7,7 @@ from typing import Any
 from collision_monitor.errors import InputError
 from collision_monitor.records import StateFlag
 from collision_monitor.sources.ground.mapping import Mapping
+from collision_monitor.sources.ground.motion_models import ARC, MotionModels
 from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.scene_states import empty_states
 from collision_monitor.sources.ground.source import Source
@@ -26,11 +27,12 @@ class FrameSource(Source):
     def __init__(self, entry: ObjectEntry, message_type: str, mapping: Mapping) -> None:
         if not entry.frame:
             raise InputError(f"{entry.name}: {entry.topic} is a {message_type}; expected `frame: …`, got none")
-        entry.allow_only(("frame", "position_stddev", "estimate_over"), message_type)
+        entry.allow_only(("frame", "position_stddev", "estimate_over", "motion"), message_type)
         require_shape(entry)
         self.name, self.topics = entry.name, {entry.topic: (message_type,)}
         self.frame = entry.frame
         self._entry = entry
+        self._models = MotionModels(entry.name, entry.motion, ARC)
 
     def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
         """See Source. The feed has put the transforms into the tree; `stamp_ns` is that of the moved frame."""
@@ -42,7 +44,8 @@ class FrameSource(Source):
         states["position"], states["quaternion"] = frame.position, frame.quaternion
         states["flags"] = StateFlag.TWIST_UNKNOWN
         states["position_stddev"] = entry.position_stddev
-        scene.observe(entry.name, states, stamp_ns, window=entry.estimate_over)
+        turns = self._models.apply(states, ("",), scene.horizon)
+        scene.observe(entry.name, states, stamp_ns, window=entry.estimate_over, turns=turns)
 
     def moved_by(self, scene: SourceScene) -> str | None:
         """Return the frame whose transforms move the object; None if there is none."""

@@ -4,6 +4,8 @@ plans:
   robot:                          # an entry of `objects:`
     topic: /plan                  # nav_msgs/Path, or autoware_planning_msgs/Trajectory
     speed: 0.5                    # m/s, for a Path without stamps
+    acceleration: 0.5             # m/s^2, likewise: the robot starts from its speed and ends at rest
+    lateral_acceleration: 0.4     # m/s^2, likewise: it is slower in bends
     headings: path                # along the path; or `message`, the orientations in it
     then: rest                    # or `go on`: along the last piece
     tolerance: {across: 0.3, along: 0.5, angle: 0.5, time: 1.0}      # m, m, rad, s
@@ -12,6 +14,7 @@ plans:
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import inf
 from typing import Any, Final
 
 from collision_monitor.codec.trajectories import Then
@@ -19,21 +22,23 @@ from collision_monitor.errors import InputError
 from collision_monitor.motion.trajectory import FASTEST, Tolerance
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.yaml_table import known, number, table, text
+from collision_monitor.sources.plans.speed_profile import SLOWEST, SpeedLimits
 
-_KEYS: Final = ("topic", "speed", "headings", "then", "tolerance")
+_LIMITS: Final = ("acceleration", "lateral_acceleration")
+_KEYS: Final = ("topic", "speed", *_LIMITS, "headings", "then", "tolerance")
 _THEN: Final = {"rest": Then.REST, "go on": Then.GO_ON}
-SLOWEST: Final = 1e-3
-"""m/s: the least `speed`. Smaller: a wrong unit, and a plan of hours."""
+GENTLEST: Final = 1e-3
+"""m/s^2: the least acceleration. Smaller: a wrong unit."""
 
 
 @dataclass(frozen=True)
 class PlanEntry:
-    """Which topic holds the plan of an object. speed: m/s; 0: not given. by_path: headings are along the path."""
+    """Which topic holds the plan of an object. by_path: headings are along the path."""
 
     name: str
     object_id: int
     topic: str
-    speed: float
+    limits: SpeedLimits
     by_path: bool
     then: Then
     tolerance: Tolerance
@@ -63,12 +68,24 @@ def _entry(name: str, object_id: int, given: dict[str, Any]) -> PlanEntry:
     headings, then = given.get("headings", "message"), given.get("then", "rest")
     known(str(headings), ("message", "path"), f"{name}, headings")
     known(str(then), tuple(_THEN), f"{name}, then")
-    speed = number(given["speed"], f"{name}, speed", "m/s", least=SLOWEST, most=FASTEST) if "speed" in given else 0.0
     tolerance = table(given.get("tolerance", {}), f"{name}, tolerance", Tolerance._fields)
     units = dict(zip(Tolerance._fields, ("m", "m", "rad", "s"), strict=True))
     values = {key: number(each, f"{name}, tolerance, {key}", units[key]) for key, each in tolerance.items()}
     if values and not any(Tolerance()._replace(**values)):
         raise InputError(f"{name}, tolerance: expected at least one number above 0, got only zeros")
     return PlanEntry(
-        name, object_id, topic, speed, headings == "path", _THEN[then], Tolerance()._replace(**values)
+        name, object_id, topic, _limits(name, given), headings == "path", _THEN[then], Tolerance()._replace(**values)
     )  # fmt: skip
+
+
+def _limits(name: str, given: dict[str, Any]) -> SpeedLimits:
+    if "speed" not in given:
+        for key in _LIMITS:
+            if key in given:
+                raise InputError(f"{name}, {key}: expected `speed` beside it, the limit on straight ways, got none")
+        return SpeedLimits(0.0)
+    speed = number(given["speed"], f"{name}, speed", "m/s", least=SLOWEST, most=FASTEST)
+    return SpeedLimits(
+        speed,
+        *(number(given[key], f"{name}, {key}", "m/s^2", least=GENTLEST) if key in given else inf for key in _LIMITS),
+    )

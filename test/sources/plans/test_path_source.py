@@ -8,54 +8,22 @@ from typing import Any
 import numpy as np
 import pytest
 from fed import Fed
-from foreign_bag import SECOND, START, STORE, T, header, odometry, pose, transforms, write_bag
-from foreign_messages import decoder
-from rosbags.typesys import get_types_from_msg
+from foreign_bag import SECOND, START, odometry, transforms, write_bag
+from foreign_plans import ROBOT, path, trajectory
 
+from collision_monitor.alerts.rules import Rules
+from collision_monitor.cli.main import main
 from collision_monitor.codec import decode_predictions, decode_trajectories
 from collision_monitor.errors import InputError
 from collision_monitor.session import Session
+from collision_monitor.session.history.expectations import evaluate_expectations, parse_expectations
+from collision_monitor.session.history.read_history import AS_RECORDED, read_history
 from collision_monitor.session.replaying.replay import replay
 from collision_monitor.session.replaying.replay_report import Verdict
 from collision_monitor.sources import import_bag, load_mapping
+from collision_monitor.view.recording import RecordedSteps
 
-PATH, TRAJECTORY = "nav_msgs/msg/Path", "autoware_planning_msgs/msg/Trajectory"
-ROBOT = {"robot": {"topic": "/odom", "shape": {"box": [0.4, 0.4, 0.4]}}}
 CORNER = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (1, 1, 0), (1, 3, 0)]
-POINT = """\
-builtin_interfaces/Duration time_from_start
-geometry_msgs/Pose pose
-float32 longitudinal_velocity_mps
-float32 lateral_velocity_mps
-float32 acceleration_mps2
-float32 heading_rate_rps
-float32 front_wheel_angle_rad
-float32 rear_wheel_angle_rad
-"""
-DEFINITION = (
-    f"std_msgs/Header header\nautoware_planning_msgs/TrajectoryPoint[] points\n{'=' * 80}\n"
-    f"MSG: autoware_planning_msgs/TrajectoryPoint\n{POINT}"
-)
-
-
-def path(points: Any, stamps: Any = None, frame: str = "map", stamp: int = START) -> tuple[str, Any]:
-    stamps = [0] * len(points) if stamps is None else stamps
-    kind = T["geometry_msgs/msg/PoseStamped"]
-    return PATH, T[PATH](
-        header(frame, stamp), [kind(header(frame, t), pose(p)) for p, t in zip(points, stamps, strict=True)]
-    )
-
-
-def trajectory(points: Any, speeds: Any, times: Any = None) -> tuple[str, Any]:
-    if TRAJECTORY not in T:
-        STORE.register(get_types_from_msg(DEFINITION, TRAJECTORY))
-        decoder().define(TRAJECTORY, DEFINITION)
-    point, duration = T["autoware_planning_msgs/msg/TrajectoryPoint"], T["builtin_interfaces/msg/Duration"]
-    rows = [
-        point(duration(int(t), round(t % 1 * 1e9)), pose(p), v, 0.0, 0.0, 0.0, 0.0, 0.0)
-        for p, v, t in zip(points, speeds, times or [0.0] * len(points), strict=True)
-    ]
-    return TRAJECTORY, T[TRAJECTORY](header("map", START), rows)
 
 
 def fed(**plan: Any) -> Fed:
@@ -183,3 +151,56 @@ def test_a_bag_with_a_path_predicts_the_post_behind_the_bend_and_replays(tmp_pat
         for name in ("run.mcap", "again.mcap")
     )
     assert one == other
+
+
+def leaving_bag(folder: Path) -> Path:
+    """A robot that follows its path for 1 s, and then drives straight past the bend."""
+    still = ((0, 0, 0, 1), (1.0, 0, 0), (0, 0, 0))
+    messages: Any = []
+    for k in range(25):
+        t = START + k * SECOND // 10
+        messages.append(("/odom", t, odometry("map", t, (k / 10, 0, 0), *still)))
+    messages.insert(1, ("/plan", START + 1, path([(0, 0, 0), (1, 0, 0), (1, 3, 0)])))
+    return write_bag(folder / "bag", messages)
+
+
+RULES = "rules: {off plan: {left_plan: any, raise_after: 0.2}}\n"
+
+
+def test_the_report_the_check_and_the_page_say_who_left_its_plan(tmp_path: Path) -> None:
+    tolerance = FILE.replace("speed: 0.5", "speed: 1.0").replace("angle: 3", "angle: 3, across: 0.15, along: 0.5")
+    (tmp_path / "sources.yaml").write_text(tolerance)
+    (tmp_path / "rules.yaml").write_text(RULES)
+    import_bag(leaving_bag(tmp_path), tmp_path / "run.mcap", load_mapping(tmp_path / "sources.yaml"))
+    session = Session(tmp_path / "run.mcap")
+    history = read_history(session)
+    (use,) = history.plans
+    assert (use.object_id, use.count, use.times_left) == (1, 1, 1)
+    assert use.left == [pytest.approx(1.2)]  # more than 0.15 m beside the path behind the bend
+    assert main(["report", str(session.path), "-o", str(tmp_path / "run.html")]) == 0
+    text = (tmp_path / "run.html").read_text()
+    assert "1 of 1 objects with plans left theirs" in text and "<h2>Plans</h2>" in text
+    assert '<td><bdi>robot</bdi></td><td class="number">1</td><td class="number">1</td><td>1.200</td>' in text
+
+    rules = Rules.given(str(tmp_path / "rules.yaml"))
+    judged = read_history(session, rules=rules)
+    assert [(round(time, 3), alert.level) for time, alert in judged.alerts] == [(1.4, 2)]
+    assert judged.plans[0].left == use.left
+    given = parse_expectations(
+        {
+            "expect": [
+                {"alert": ["robot", "robot"], "rule": "off plan", "between": [1.3, 1.5]},
+                {"no_alert": ["robot", "robot"]},
+                {"no_alert": ["robot", "post"]},
+            ]
+        }
+    )
+    assert [each.holds for each in evaluate_expectations(given, judged, lambda: "")] == [True, False, True]
+
+    steps = RecordedSteps(session, AS_RECORDED)
+    moments = [steps.moment(frame) for frame in (5, 20)]
+    assert [set(moment.plans) for moment in moments] == [{1}, set()]
+    assert [moment.left_plans for moment in moments] == [frozenset(), {1}]
+    recorded = RecordedSteps(session)
+    for frame in range(len(steps)):
+        assert steps.moment(frame).predictions.tobytes() == recorded.moment(frame).predictions.tobytes()
