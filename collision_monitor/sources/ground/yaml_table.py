@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.checks.numbers import as_numbers, checked_yaml_number
-from collision_monitor.codec.shape_fields import make_shape
+from collision_monitor.codec.shape_fields import RawShape, make_shape
 from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.records import ShapeType
 from collision_monitor.settings.names import nearest_name
@@ -90,7 +90,7 @@ def shape(value: Any, name: str) -> tuple[Shape, Pose]:
     none = np.zeros(0)
     dimensions, vertices = (none, given) if by_vertices else (np.atleast_1d(given), none)
     try:
-        made = make_shape(ShapeType[kind.upper()], dimensions, vertices, np.zeros(0, np.uint32))
+        made = make_shape(RawShape(ShapeType[kind.upper()], dimensions, vertices))
     except CollisionMonitorError as error:
         raise InputError(f"{name}, shape: {error}") from None
     return made, pose(content["at"], f"{name}, at") if "at" in content else Pose()
