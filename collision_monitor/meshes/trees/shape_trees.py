@@ -12,7 +12,7 @@ from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.meshes.distance.contact import tree_reach
 from collision_monitor.meshes.trees.cloud_tree import cloud_tree
-from collision_monitor.meshes.trees.tiled_tree import tile_trees, tiled_tree
+from collision_monitor.meshes.trees.tiled_tree import map_tree
 from collision_monitor.meshes.trees.tree import tree_of
 from collision_monitor.shapes.cells.tiled_solid import TiledSolid
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
@@ -71,9 +71,9 @@ def made_tree(shape: Shape, split: int = 0) -> Array | None:
     """As `shape_tree`, but made anew; split: of a mesh's faces, see `tree_of`."""
     match shape:
         case TiledSolid():
-            trees = tile_trees(shape.tiles, shape.__dict__.pop("former_trees", ()))
-            shape.__dict__["tile_trees"] = trees
-            return tiled_tree(trees)
+            made = map_tree(shape.tiles, shape.__dict__.pop("former_tree", None))
+            shape.__dict__["map_tree"] = made
+            return made.blocks
         case Mesh():
             surface = shape.surface
             faces = surface.faces if len(surface.faces) else shape.faces[:1]

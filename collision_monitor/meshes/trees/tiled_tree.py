@@ -50,8 +50,13 @@ class TileTree(NamedTuple):
     reach: float
     digest: bytes
 
+    @property
+    def room(self) -> int:
+        """Blocks that it gets in the tree of a map: a power of two, so that a small change does not move the others."""
+        return 1 << (len(self.blocks) - BOXES - 1).bit_length()
 
-def tile_trees(tiles: Sequence[Array], known: Sequence[TileTree] = ()) -> list[TileTree]:
+
+def _tile_trees(tiles: Sequence[Array], known: Sequence[TileTree]) -> list[TileTree]:
     """Make the tree of each tile, given by its triangles (n, 3, 3) in m; the trees of the same arrays are kept."""
     found = {id(each.corners): each for each in known}
     new = [tile for tile in tiles if id(tile) not in found]
@@ -77,31 +82,81 @@ def _made(tiles: list[Array]) -> list[TileTree]:
     ]
 
 
-def tiled_tree(trees: Sequence[TileTree]) -> Array:
-    """Compose the tree of a closed surface of the trees of its tiles, at least one; its faces are numbered through."""
-    count = len(trees)
-    above = _boxes_above(count)
-    sizes = np.array([len(each.blocks) - BOXES for each in trees])
-    first = BOXES * (1 + above) + np.cumsum(sizes) - sizes
-    tree = np.concatenate([np.zeros((BOXES * (1 + above), ROWS, WIDTH)), *(each.blocks[BOXES:] for each in trees)])
-    child = tree[BOXES * (1 + above) :, CHILD]
-    child += np.sign(child) * np.repeat(first - BOXES, sizes)[:, None]
-    faces = np.array([len(each.corners) for each in trees])
-    leaves = -(-faces // WIDTH)
-    within = np.arange(leaves.sum()) - np.repeat(np.cumsum(leaves) - leaves, leaves)
-    tree[np.repeat(first + sizes - leaves, leaves) + within, FACE] += np.repeat(np.cumsum(faces) - faces, leaves)[
-        :, None
-    ]
-    boxes = np.stack([each.blocks[:BOXES, :, 0] for each in trees])
-    boxes[:, 0, CHILD] += np.sign(boxes[:, 0, CHILD]) * (first - BOXES)
-    k = np.arange(count)
-    for row in range(BOXES):
-        tree[(BOXES if count > 1 else 0) + BOXES * (k // WIDTH) + row, :, k % WIDTH] = boxes[:, row]
-    if count > 1:
-        size = -(-count // WIDTH)
+class MapTree(NamedTuple):
+    """The tree of a map (n, ROWS, WIDTH), and the trees of the tiles that it is composed of."""
+
+    blocks: Array
+    trees: Sequence[TileTree]
+
+
+def map_tree(tiles: Sequence[Array], former: MapTree | None = None) -> MapTree:
+    """Make the tree of a closed surface, given by the triangles (n, 3, 3) in m of its tiles, at least one.
+
+    former: that of a map with some of the same arrays, whose trees are kept. The answer does not depend on it.
+    """
+    trees = _tile_trees(tiles, () if former is None else former.trees)
+    rooms = np.array([each.room for each in trees])
+    first = BOXES * (1 + _boxes_above(len(trees))) + np.cumsum(rooms) - rooms
+    changed = None if former is None else _changed(trees, former.trees)
+    if former is None or changed is None:
+        tree = np.zeros((int(first[-1] + rooms[-1]), ROWS, WIDTH))
+        changed = list(range(len(trees)))
+    else:
+        tree = former.blocks.copy()
+    _plant(tree, trees, first, np.array(changed, np.int64))
+    _number_faces(tree, trees, first, changed)
+    if len(trees) > 1:
+        size = -(-len(trees) // WIDTH)
         _fill_above(tree, BOXES, size, BOXES * (1 + size), np.empty(REACHES))
     _state_facts(tree, trees)
-    return tree
+    return MapTree(tree, trees)
+
+
+def _changed(trees: Sequence[TileTree], former: Sequence[TileTree]) -> list[int] | None:
+    """Which trees differ from the former ones in the same places; None if they do not fit into those."""
+    if len(trees) != len(former):
+        return None
+    changed = [k for k, (new, old) in enumerate(zip(trees, former, strict=True)) if new is not old]
+    return changed if all(trees[k].room == former[k].room for k in changed) else None
+
+
+def _plant(tree: Array, trees: Sequence[TileTree], first: NDArray[np.int64], tiles: NDArray[np.int64]) -> None:
+    """Write the trees of some tiles, each from its first block on, and their boxes to those over the tiles."""
+    own = [trees[k] for k in tiles.tolist()]
+    if not own:
+        return
+    sizes = np.array([len(each.blocks) - BOXES for each in own])
+    start = first[tiles]
+    place = np.repeat(start, sizes) + _counted(sizes)
+    content = np.concatenate([each.blocks[BOXES:] for each in own])
+    content[:, CHILD] += np.sign(content[:, CHILD]) * np.repeat(start - BOXES, sizes)[:, None]
+    tree[place] = content
+    boxes = np.stack([each.blocks[:BOXES, :, 0] for each in own])
+    boxes[:, 0, CHILD] += np.sign(boxes[:, 0, CHILD]) * (start - BOXES)
+    above = BOXES * (1 + tiles // WIDTH) if len(trees) > 1 else np.zeros(1, np.int64)
+    for row in range(BOXES):
+        tree[above + row, :, tiles % WIDTH] = boxes[:, row]
+
+
+def _counted(sizes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Numbers from 0 on, anew for each of some lengths."""
+    return np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+
+
+def _number_faces(tree: Array, trees: Sequence[TileTree], first: NDArray[np.int64], changed: list[int]) -> None:
+    """Number the faces of all tiles through, from the first one that has changed on."""
+    if not changed:
+        return
+    begin = min(changed)
+    count = np.array([len(each.corners) for each in trees])
+    leaves = (-(-count // WIDTH))[begin:]
+    place = first[begin:] + np.array([len(each.blocks) for each in trees[begin:]]) - BOXES - leaves
+    within = _counted(leaves)
+    last = (count[begin:] - 1) - WIDTH * (leaves - 1)
+    last = np.where(np.arange(leaves.sum()) == np.repeat(np.cumsum(leaves) - 1, leaves), np.repeat(last, leaves), WIDTH)
+    lanes = np.minimum(np.arange(WIDTH), last[:, None])
+    base = np.repeat((np.cumsum(count) - count)[begin:], leaves) + WIDTH * within
+    tree[np.repeat(place, leaves) + within, FACE] = base[:, None] + lanes
 
 
 def _state_facts(tree: Array, trees: Sequence[TileTree]) -> None:

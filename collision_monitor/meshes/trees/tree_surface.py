@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.meshes.layout import CHILD, CLOSED, CORNERS, FACE, FIRST_PART, MOST_PARTS, PARTS, WIDTH
-from collision_monitor.meshes.trees.tiled_tree import tile_trees, tiled_tree, tiles_of
+from collision_monitor.meshes.trees.tiled_tree import map_tree, tiles_of
 from collision_monitor.meshes.trees.tree import tree_of
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ class TreeSurface(NamedTuple):
     def tree(self) -> Array:
         """The tree over the triangles."""
         if len(self.tiles):
-            return tiled_tree(tile_trees(np.split(self.corners, np.cumsum(self.tiles)[:-1])))
+            return map_tree(np.split(self.corners, np.cumsum(self.tiles)[:-1])).blocks
         return tree_of(self.corners, closed=self.closed, parts=self.parts)
 
 

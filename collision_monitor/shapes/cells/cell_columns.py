@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,16 +27,34 @@ def column_tiles(filled: Booleans, size: Array) -> Tiles:
     return tiles_of_rectangles(found, _EDGE, size, _NOWHERE)
 
 
-def changed_column_tiles(filled: Booleans, size: Array, window: Window, former: Tiles) -> Tiles:
-    """The same where only the cells of a window have changed: the others' arrays are those of `former`."""
+class TouchedTiles(NamedTuple):
+    """The tiles of a grid (rows, columns) whose faces depend on some cells: from low to high, along y and x."""
+
+    low: tuple[int, int]
+    high: tuple[int, int]
+
+    def part(self, cells: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """The cells of these tiles, with a border of one cell; 0 beyond the grid."""
+        part = np.zeros([(b - a) * GRID_TILE + 2 for a, b in zip(self.low, self.high, strict=True)], np.uint8)
+        begin = [a * GRID_TILE - 1 for a in self.low]
+        inner = cells[tuple(slice(max(b, 0), b + n) for b, n in zip(begin, part.shape, strict=True))]
+        part[tuple(slice(max(-b, 0), max(-b, 0) + n) for b, n in zip(begin, inner.shape, strict=True))] = inner
+        return part
+
+    def tiles(self, filled: Booleans, size: Array, former: Tiles) -> Tiles:
+        """The tiles of the grid: these anew, from the cells of their part that are columns; the others as they were."""
+        first = self.low[0] * GRID_TILE, self.low[1] * GRID_TILE
+        new = tiles_of_rectangles(column_rectangles(filled, first), _EDGE, size, _NOWHERE)
+        row, column = (each.ravel() for each in np.mgrid[self.low[0] : self.high[0], self.low[1] : self.high[1]])
+        these: Indices = np.column_stack([column, row, np.zeros_like(row)])
+        known = former.copy()
+        for number in along_curve(these).tolist():
+            known.pop(number, None)
+        return dict(sorted([*known.items(), *new.items()]))
+
+
+def touched_tiles(shape: tuple[int, int], window: Window) -> TouchedTiles:
+    """The tiles of a grid of some shape whose faces depend on the cells of a window."""
     low = [max(each.start - 1, 0) // GRID_TILE for each in window]
-    high = [-(-min(each.stop + 1, n) // GRID_TILE) for each, n in zip(window, filled.shape, strict=True)]
-    part = np.zeros([(b - a) * GRID_TILE + 2 for a, b in zip(low, high, strict=True)], np.bool_)
-    begin = [a * GRID_TILE - 1 for a in low]
-    inner = filled[tuple(slice(max(b, 0), b + n) for b, n in zip(begin, part.shape, strict=True))]
-    part[tuple(slice(max(-b, 0), max(-b, 0) + n) for b, n in zip(begin, inner.shape, strict=True))] = inner
-    new = tiles_of_rectangles(column_rectangles(part, (begin[0] + 1, begin[1] + 1)), _EDGE, size, _NOWHERE)
-    row, column = (each.ravel() for each in np.mgrid[low[0] : high[0], low[1] : high[1]])
-    touched: Indices = np.column_stack([column, row, np.zeros_like(row)])
-    stale = set(along_curve(touched).tolist())
-    return dict(sorted([*(each for each in former.items() if each[0] not in stale), *new.items()]))
+    high = [-(-min(each.stop + 1, n) // GRID_TILE) for each, n in zip(window, shape, strict=True)]
+    return TouchedTiles((low[0], low[1]), (high[0], high[1]))

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from collision_monitor.checks.numbers import checked_number, hides_some
 from collision_monitor.errors import ShapeError
 from collision_monitor.records import ShapeType
-from collision_monitor.shapes.cells.cell_columns import Tiles, Window, changed_column_tiles, column_tiles
+from collision_monitor.shapes.cells.cell_columns import Tiles, Window, column_tiles, touched_tiles
 from collision_monitor.shapes.cells.cell_faces import MOST_ALONG
 from collision_monitor.shapes.cells.packed_cells import packed, unpacked
 from collision_monitor.shapes.cells.tiled_solid import TiledSolid, tiled_mass
@@ -31,6 +31,8 @@ UNKNOWN_IS: Final = ("unresolved", "obstacle", "free")
 
 OCCUPIED_FROM: Final = 65.0
 """Least value of an occupied cell, as that of nav2's map server."""
+
+NOTHING: Final = "Grid: expected a cell that is occupied or may be, got none; leave the object out"
 
 
 class Grid(TiledSolid):
@@ -68,7 +70,7 @@ class Grid(TiledSolid):
         values.setflags(write=False)
         self.__dict__.update(cells=values, resolution=resolution, height=height, unknown=unknown)
         if not (self._are(OCCUPIED).any() or (unknown != "free" and self._are(UNKNOWN).any())):
-            raise ShapeError("Grid: expected a cell that is occupied or may be, got none; leave the object out")
+            raise ShapeError(NOTHING)
 
     def _are(self, value: int) -> Booleans:
         return np.asarray(self.cells == value)
@@ -77,18 +79,17 @@ class Grid(TiledSolid):
     def _size(self) -> Array:
         return np.array([self.resolution, self.resolution, self.height])
 
-    @property
-    def _layers(self) -> dict[bool, Booleans]:
-        """Which cells are certainly there (False), and which are UNRESOLVED (True)."""
+    def _layers(self, part: NDArray[np.uint8]) -> dict[bool, Booleans]:
+        """Which cells of a part are certainly there (False), and which are UNRESOLVED (True)."""
         if self.unknown == "obstacle":
-            return {False: self.cells != FREE}
-        certain = {False: self._are(OCCUPIED)}
-        return certain if self.unknown == "free" else {**certain, True: self._are(UNKNOWN)}
+            return {False: part != FREE}
+        certain = {False: np.asarray(part == OCCUPIED)}
+        return certain if self.unknown == "free" else {**certain, True: np.asarray(part == UNKNOWN)}
 
     @cached_property
     def _tiles(self) -> dict[bool, Tiles]:
         """The tiles of each layer."""
-        return {unsure: column_tiles(filled, self._size) for unsure, filled in self._layers.items()}
+        return {unsure: column_tiles(filled, self._size) for unsure, filled in self._layers(self.cells).items()}
 
     @cached_property
     def tiles(self) -> tuple[Array, ...]:  # type: ignore[override]
@@ -119,9 +120,12 @@ class Grid(TiledSolid):
         window = slice(row, row + len(values)), slice(column, column + values.shape[1])
         changed = self.cells.copy()
         changed[window] = values
+        changed.setflags(write=False)
         grid = object.__new__(Grid)
-        grid._set(changed, self.resolution, self.height, self.unknown)
+        grid.__dict__.update(self.__getstate__(), cells=changed)
         grid._take_tiles(self, window)
+        if not any(grid._tiles.values()):
+            raise ShapeError(NOTHING)
         return grid
 
     def share_tiles(self, former: Grid) -> None:
@@ -136,13 +140,14 @@ class Grid(TiledSolid):
         self._take_tiles(former, (slice(spans[0][0], spans[0][-1] + 1), slice(spans[1][0], spans[1][-1] + 1)))
 
     def _take_tiles(self, former: Grid, window: Window) -> None:
-        size, known = self._size, former._tiles
+        touched = touched_tiles(self.cells.shape, window)
+        layers = self._layers(touched.part(self.cells))
         self.__dict__["_tiles"] = {
-            unsure: changed_column_tiles(filled, size, window, known[unsure]) for unsure, filled in self._layers.items()
+            unsure: touched.tiles(filled, self._size, former._tiles[unsure]) for unsure, filled in layers.items()
         }
-        trees = {each.unsure: each.__dict__.get("tile_trees", ()) for each in former.solids}
+        trees = {each.unsure: each.__dict__.get("map_tree") for each in former.solids}
         for solid in self.solids:
-            solid.__dict__["former_trees"] = trees.get(solid.unsure, ())
+            solid.__dict__["former_tree"] = trees.get(solid.unsure)
 
     def __getstate__(self) -> dict[str, Any]:
         """Copies and pickles hold the cells alone."""
