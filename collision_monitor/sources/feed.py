@@ -28,6 +28,7 @@ from collision_monitor.sources.ground.source_time import MAX_TIME_STEP, MessageS
 from collision_monitor.sources.ground.unmonitored import Unmonitored
 from collision_monitor.sources.ground.waiting_states import Step
 from collision_monitor.sources.kinds import BY_TYPE, SECTIONS
+from collision_monitor.sources.messages.grids import UPDATES
 from collision_monitor.sources.messages.static_objects import StandingObjects
 from collision_monitor.sources.messages.tf_objects import FrameSource
 from collision_monitor.sources.messages.transform_arrays import TRANSFORMS, TransformArrays
@@ -131,6 +132,7 @@ class Feed:
         found: dict[str, tuple[str, ...]] = {}
         for topic, entries in self.mapping.topics.items():
             found[topic] = tuple({entry.type: None for entry in entries if entry.type}) or tuple(BY_TYPE)
+            found.update({entry.updates: tuple(UPDATES.values()) for entry in entries if entry.updates})
         for source in self._sources:
             found.update(source.topics)
         return found
@@ -140,7 +142,9 @@ class Feed:
         problems = {}
         for entry in self.mapping.topics.get(topic, ()):
             try:
-                self._add(self._source(entry, message_type), [topic])
+                source = self._source(entry, message_type)
+                self._add(source, source.topics)
+                self.owners.update(dict.fromkeys(source.topics.keys() - self._lines.keys(), entry.name))
             except InputError as error:
                 problems[entry.name] = str(error)
         return problems
@@ -169,6 +173,8 @@ class Feed:
 
     def miss_topic(self, topic: str, reason: str, now_ns: int) -> None:
         """Note why nothing of a topic is monitored: no publisher, another type. A message ends that."""
+        if topic in {entry.updates for entry in self.mapping.sources}:  # there may never be one
+            return
         if not all(each.awaited for each in self._by_topic.get(topic, ())):
             return
         for line in self.lines_of(topic):

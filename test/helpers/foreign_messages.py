@@ -112,3 +112,31 @@ def point_cloud(frame: str, stamp: int, points: Any, *, gap: int = 4) -> tuple[s
     return name, T[name](
         header(frame, stamp), 1, len(points), fields, False, 12 + gap, (12 + gap) * len(points), data, False
     )
+
+
+def occupancy_grid(
+    frame: str, stamp: int, cells: Any, resolution: float = 0.5, p: Any = (0, 0, 0), q: Any = (0, 0, 0, 1)
+) -> tuple[str, Any]:
+    name, values = "nav_msgs/msg/OccupancyGrid", np.asarray(cells, np.int8)
+    time = header(frame, stamp).stamp
+    about = T["nav_msgs/msg/MapMetaData"](time, resolution, values.shape[1], values.shape[0], pose(p, q))
+    return name, T[name](header(frame, stamp), about, values.ravel())
+
+
+def occupancy_update(frame: str, stamp: int, row: int, column: int, cells: Any) -> tuple[str, Any]:
+    name, values = "map_msgs/msg/OccupancyGridUpdate", np.asarray(cells, np.int8)
+    return name, T[name](header(frame, stamp), column, row, values.shape[1], values.shape[0], values.ravel())
+
+
+def costmap(frame: str, stamp: int, cells: Any, resolution: float = 0.5) -> tuple[str, Any]:
+    name, values = "nav2_msgs/msg/Costmap", np.asarray(cells, np.uint8)
+    time = header(frame, stamp).stamp
+    about = T["nav2_msgs/msg/CostmapMetaData"](
+        time, time, "", resolution, values.shape[1], values.shape[0], pose((0, 0, 0))
+    )
+    return name, T[name](header(frame, stamp), about, values.ravel())
+
+
+def costmap_update(frame: str, stamp: int, row: int, column: int, cells: Any) -> tuple[str, Any]:
+    name, values = "nav2_msgs/msg/CostmapUpdate", np.asarray(cells, np.uint8)
+    return name, T[name](header(frame, stamp), column, row, values.shape[1], values.shape[0], values.ravel())

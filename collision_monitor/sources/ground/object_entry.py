@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.shapes.kinds.grid import UNKNOWN_IS
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Shape
 from collision_monitor.sources.ground.yaml_table import SHAPES, known, number, pose, shape, table, text, truth
@@ -28,10 +29,11 @@ NUMBERS: Final = {
     "min_range": ("m", 0.0),
     "max_range": ("m", 1e9),
     "clearance": ("m", 0.0),
+    "threshold": ("value", 0.0),
 }
 """Keys with a number, their units and defaults."""
 
-KEYS: Final = (*PLACE, *BODY, "covariance", "without", "nan_is_free", *NUMBERS)
+KEYS: Final = (*PLACE, *BODY, "covariance", "without", "nan_is_free", "unknown", "updates", *NUMBERS)
 
 
 @dataclass(frozen=True)
@@ -42,7 +44,8 @@ class ObjectEntry:
     markers of the namespace. shapes: empty if the messages hold them. each: the shape of each object of a
     group, in place of those in the messages. pose: of a static object, in `frame` (empty: the
     monitor's). covariance: whether covariances in the messages are used. without: names of the objects
-    whose points a scan leaves out. nan_is_free: whether its NaN mean that nothing is there. given: the keys that the
+    whose points a scan leaves out. nan_is_free: whether its NaN mean that nothing is there. unknown: what unknown
+    cells of a map are (UNKNOWN_IS). updates: the topic of its updates, or empty. given: the keys that the
     file holds. The numbers are those of NUMBERS.
     """
 
@@ -74,6 +77,9 @@ class ObjectEntry:
     min_range: float = 0.0
     max_range: float = 1e9
     clearance: float = 0.0
+    threshold: float = 0.0
+    unknown: str = UNKNOWN_IS[0]
+    updates: str = ""
     without: tuple[str, ...] = ()
     nan_is_free: bool = False
     given: tuple[str, ...] = ()
@@ -161,6 +167,8 @@ def _entry(name: str, content: dict[str, Any], object_id: int) -> ObjectEntry:
     for key, names in (("allowed", allowed), ("without", without)):
         if not isinstance(names, list):
             raise InputError(f"{name}, {key}: expected a list of names, got {names!r}")
+    unknown = text(content.get("unknown", UNKNOWN_IS[0]), f"{name}, unknown")
+    known(unknown, UNKNOWN_IS, f"{name}, unknown")
     values: dict[str, Any] = {
         key: number(content.get(key, default), f"{name}, {key}", unit) for key, (unit, default) in NUMBERS.items()
     }
@@ -182,6 +190,8 @@ def _entry(name: str, content: dict[str, Any], object_id: int) -> ObjectEntry:
         without=tuple(map(str, without)),
         covariance=truth(content.get("covariance", True), f"{name}, covariance"),
         nan_is_free=truth(content.get("nan_is_free", False), f"{name}, nan_is_free"),
+        unknown=unknown,
+        updates=text(content.get("updates", ""), f"{name}, updates"),
         given=tuple(content),
         **values,
     )

@@ -14,10 +14,12 @@ from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.records import ShapeType
 from collision_monitor.settings.names import nearest_name
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.registry import Shape
+from collision_monitor.shapes.registry import KINDS, Mesh, Shape
 
 BY_VERTICES = ("convex_hull", "polygon")
-SHAPES = tuple(kind.name.lower() for kind in ShapeType if kind not in (ShapeType.MESH, ShapeType.POINTS))
+SHAPES = tuple(
+    kind.name.lower() for kind in ShapeType if kind != ShapeType.POINTS and not issubclass(KINDS[kind - 1].shape, Mesh)
+)
 
 
 def table(value: Any, what: str, keys: Collection[str]) -> dict[str, Any]:
