@@ -14,6 +14,7 @@ from collision_monitor.sources.messages.detections import DETECTIONS, DetectionS
 from collision_monitor.sources.messages.footprints import FOOTPRINT, FootprintSource
 from collision_monitor.sources.messages.grids import COSTMAP, GRID, GridSource
 from collision_monitor.sources.messages.markers import MARKER, MARKERS, MarkerSource
+from collision_monitor.sources.messages.octomaps import OCTOMAP, OctomapSource
 from collision_monitor.sources.messages.poses import ODOMETRY, POSE, POSE_WITH_COVARIANCE, PoseSource
 from collision_monitor.sources.messages.tf_objects import TRANSFORMS, FrameSource
 from collision_monitor.sources.plans.path_source import make_plans
@@ -37,6 +38,7 @@ BY_TYPE: Final[dict[str, Callable[[ObjectEntry, str, Mapping], Source]]] = {
     CLOUD: CloudSource,
     GRID: GridSource,
     COSTMAP: GridSource,
+    OCTOMAP: OctomapSource,
 }
 """Makes the source of an entry of `objects:` from the entry, the type of its topic, and the whole file. Raises
 InputError for an entry that does not fit the type."""

@@ -140,3 +140,8 @@ def costmap(frame: str, stamp: int, cells: Any, resolution: float = 0.5) -> tupl
 def costmap_update(frame: str, stamp: int, row: int, column: int, cells: Any) -> tuple[str, Any]:
     name, values = "nav2_msgs/msg/CostmapUpdate", np.asarray(cells, np.uint8)
     return name, T[name](header(frame, stamp), column, row, values.shape[1], values.shape[0], values.ravel())
+
+
+def octomap(frame: str, stamp: int, data: bytes, resolution: float = 0.1, *, binary: bool, id: str) -> tuple[str, Any]:
+    name = "octomap_msgs/msg/Octomap"
+    return name, T[name](header(frame, stamp), binary, id, resolution, np.frombuffer(data, np.int8))

@@ -125,7 +125,7 @@ def test_a_map_that_cannot_be_used_leaves_the_last_one(change: Any, text: str) -
     [
         (2, 3, "map", "update: expected cells within 4 x 3, got 2 x 2 from 3, 2 on"),
         (-1, 0, "map", "from 0, -1 on"),
-        (0, 0, "odom", "update: expected the frame of the map, 'map', got 'odom'"),
+        (0, 0, "odom", "no transform from 'map' to 'odom'"),
     ],
 )
 def test_an_update_outside_of_the_map_is_left_out(row: int, column: int, frame: str, text: str) -> None:
