@@ -69,7 +69,7 @@ def parse_model(model: Model | str | int) -> Model:
 
 def shape_class(shapes: Sequence[tuple[Shape, Pose]]) -> str | None:
     """Class of an object: primitive, hull, mesh or compound, each with a setting; None if there is no coarser model."""
-    if any(is_planar(shape) or isinstance(shape, HalfSpace | Points) for shape, _ in shapes):
+    if any(is_planar(shape) or isinstance(shape, HalfSpace | Points | TiledSolid) for shape, _ in shapes):
         return None
     if len(shapes) > 1:
         return "compound"

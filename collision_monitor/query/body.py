@@ -53,7 +53,7 @@ class KeptSlots:
             self.has_mesh = any(isinstance(each, WITH_TREE) for each, _ in found)
             self.is_convex = len(found) == 1 and not self.has_mesh
             # a plane shape, whose pose has to be checked, and several pieces are completed like what is uncertain
-            is_answered = len(found) == 1 and isinstance(shape, Mesh)
+            is_answered = len(found) == 1 and isinstance(shape, Mesh) and not is_unsure(found[0][0])
             self.inside = kept_tree(shape).inside if is_answered else UNCERTAIN
             if not (len(found) == 1 and found[0][0] is shape):
                 self.pieces = found

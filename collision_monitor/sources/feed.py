@@ -133,9 +133,7 @@ class Feed:
         for topic, entries in self.mapping.topics.items():
             found[topic] = tuple({entry.type: None for entry in entries if entry.type}) or tuple(BY_TYPE)
             found.update({entry.updates: tuple(UPDATES.values()) for entry in entries if entry.updates})
-        for source in self._sources:
-            found.update(source.topics)
-        return found
+        return found | {topic: types for source in self._sources for topic, types in source.topics.items()}
 
     def bind(self, topic: str, message_type: str) -> dict[str, str]:
         """Make the sources of a topic of `objects:`. Return the reason for each entry that does not fit the type."""
@@ -173,9 +171,8 @@ class Feed:
 
     def miss_topic(self, topic: str, reason: str, now_ns: int) -> None:
         """Note why nothing of a topic is monitored: no publisher, another type. A message ends that."""
-        if topic in {entry.updates for entry in self.mapping.sources}:  # there may never be one
-            return
-        if not all(each.awaited for each in self._by_topic.get(topic, ())):
+        is_optional = topic in {entry.updates for entry in self.mapping.sources}
+        if is_optional or not all(each.awaited for each in self._by_topic.get(topic, ())):
             return
         for line in self.lines_of(topic):
             self.scene.unmonitored.lacks(line, topic, reason, now_ns)

@@ -167,7 +167,7 @@ def _state_facts(tree: Array, trees: Sequence[TileTree]) -> None:
     tree[0, KEY : KEY + 2, 1] = np.frombuffer(digest)
 
 
-def tiles_of(blocks: Array, root: int) -> NDArray[np.int64]:
+def map_tiles(blocks: Array, root: int) -> NDArray[np.int64]:
     """Numbers of triangles of the tiles of the tree that begins at a block; none for a tree without tiles."""
     count = int(blocks[root, TILES, 1])
     if not count:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.meshes.layout import CHILD, CLOSED, CORNERS, FACE, FIRST_PART, MOST_PARTS, PARTS, WIDTH
-from collision_monitor.meshes.trees.tiled_tree import map_tree, tiles_of
+from collision_monitor.meshes.trees.tiled_tree import map_tiles, map_tree
 from collision_monitor.meshes.trees.tree import tree_of
 
 Array = NDArray[np.float64]
@@ -45,7 +45,7 @@ def surface_of(blocks: Array, root: int) -> TreeSurface:
     face = blocks[members, FACE].ravel().astype(np.int64)
     corners = np.empty((face.max() + 1, 3, 3))
     corners[face] = blocks[members, CORNERS : CORNERS + 9].transpose(0, 2, 1).reshape(-1, 3, 3)
-    tiles = tiles_of(blocks, root)
+    tiles = map_tiles(blocks, root)
     if len(tiles):
         return TreeSurface(corners, True, np.zeros((0, 3)), tiles)
     first, count = root + int(blocks[root, FIRST_PART, 1]), int(blocks[root, PARTS, 1])

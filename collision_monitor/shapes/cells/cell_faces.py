@@ -22,10 +22,7 @@ MOST_ALONG: Final = 1 << BITS
 """Most cells of a map along one axis."""
 
 _RUN: Final = 7
-"""Bits of the length of a run, at most the edge of a tile."""
-
-LONGEST_TILE: Final = 1 << (_RUN - 1)
-"""Longest edge of a tile in cells; every edge is a power of two."""
+"""Bits of the length of a run, at most the edge of a tile, 64 cells; every edge is a power of two."""
 
 _MASK: Final = (1 << BITS) - 1
 

@@ -12,7 +12,6 @@ from math import log
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from collision_monitor._jit import allocating_kernel
 from collision_monitor.errors import InputError
