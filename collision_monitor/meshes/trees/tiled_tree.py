@@ -128,9 +128,10 @@ def _plant(tree: Array, trees: Sequence[TileTree], first: NDArray[np.int64], til
     sizes = np.array([len(each.blocks) - BOXES for each in own])
     start = first[tiles]
     place = np.repeat(start, sizes) + _counted(sizes)
-    content = np.concatenate([each.blocks[BOXES:] for each in own])
-    content[:, CHILD] += np.sign(content[:, CHILD]) * np.repeat(start - BOXES, sizes)[:, None]
-    tree[place] = content
+    for each, at in zip(own, start.tolist(), strict=True):
+        tree[at : at + len(each.blocks) - BOXES] = each.blocks[BOXES:]
+    child = tree[place, CHILD]
+    tree[place, CHILD] = child + np.sign(child) * np.repeat(start - BOXES, sizes)[:, None]
     boxes = np.stack([each.blocks[:BOXES, :, 0] for each in own])
     boxes[:, 0, CHILD] += np.sign(boxes[:, 0, CHILD]) * (start - BOXES)
     above = BOXES * (1 + tiles // WIDTH) if len(trees) > 1 else np.zeros(1, np.int64)

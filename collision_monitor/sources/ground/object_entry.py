@@ -30,10 +30,14 @@ NUMBERS: Final = {
     "max_range": ("m", 1e9),
     "clearance": ("m", 0.0),
     "threshold": ("value", 0.0),
+    "min_height": ("m", 0.0),
+    "max_height": ("m", 1e9),
+    "ground_slope": ("deg", 0.0),
+    "ground_thickness": ("m", 0.1),
 }
 """Keys with a number, their units and defaults."""
 
-KEYS: Final = (*PLACE, *BODY, "covariance", "without", "nan_is_free", "unknown", "updates", *NUMBERS)
+KEYS: Final = (*PLACE, *BODY, "covariance", "without", "nan_is_free", "unknown", "updates", "voxels", *NUMBERS)
 
 
 @dataclass(frozen=True)
@@ -45,7 +49,8 @@ class ObjectEntry:
     group, in place of those in the messages. pose: of a static object, in `frame` (empty: the
     monitor's). covariance: whether covariances in the messages are used. without: names of the objects
     whose points a scan leaves out. nan_is_free: whether its NaN mean that nothing is there. unknown: what unknown
-    cells of a map are (UNKNOWN_IS). updates: the topic of its updates, or empty. given: the keys that the
+    cells of a map are (UNKNOWN_IS). updates: the topic of its updates, or empty. voxels: whether a
+    cloud is cells of the edge `voxel`. given: the keys that the
     file holds. The numbers are those of NUMBERS.
     """
 
@@ -80,6 +85,11 @@ class ObjectEntry:
     threshold: float = 0.0
     unknown: str = UNKNOWN_IS[0]
     updates: str = ""
+    voxels: bool = False
+    min_height: float = 0.0
+    max_height: float = 1e9
+    ground_slope: float = 0.0
+    ground_thickness: float = 0.1
     without: tuple[str, ...] = ()
     nan_is_free: bool = False
     given: tuple[str, ...] = ()
@@ -192,6 +202,7 @@ def _entry(name: str, content: dict[str, Any], object_id: int) -> ObjectEntry:
         nan_is_free=truth(content.get("nan_is_free", False), f"{name}, nan_is_free"),
         unknown=unknown,
         updates=text(content.get("updates", ""), f"{name}, updates"),
+        voxels=truth(content.get("voxels", False), f"{name}, voxels"),
         given=tuple(content),
         **values,
     )
