@@ -80,7 +80,7 @@ class CloudSource(Source):
         if cells is None:
             points, radius = thinned(points, entry.voxel, entry.radius)
         else:
-            points, radius = (cells + 0.5) * entry.voxel, 0.5 * math.sqrt(3.0) * entry.voxel
+            points, radius = entry.voxel * (cells.astype(np.float64) + 0.5), 0.5 * math.sqrt(3.0) * entry.voxel
         if not len(points):  # nothing is there, as far as the scan says
             scene.remove(entry.object_id)
             return
