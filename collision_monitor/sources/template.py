@@ -9,6 +9,7 @@ from collision_monitor.sources.messages.autoware import PREDICTED, TRACKED
 from collision_monitor.sources.messages.clouds import CLOUD, SCAN
 from collision_monitor.sources.messages.detections import DETECTIONS
 from collision_monitor.sources.messages.footprints import FOOTPRINT
+from collision_monitor.sources.messages.grid_maps import GRID_MAP
 from collision_monitor.sources.messages.grids import COSTMAP, GRID
 from collision_monitor.sources.messages.markers import MARKER, MARKERS
 from collision_monitor.sources.messages.octomaps import OCTOMAP
@@ -29,6 +30,7 @@ _ENTRIES: Final = {
     GRID: "height: 2.0, unknown: unresolved",
     COSTMAP: "height: 2.0, unknown: unresolved",
     OCTOMAP: "threshold: 0.5",
+    GRID_MAP: "layer: elevation",
 }
 """The keys of an entry besides its topic. Sizes are to be replaced by the real ones."""
 

@@ -145,3 +145,17 @@ def costmap_update(frame: str, stamp: int, row: int, column: int, cells: Any) ->
 def octomap(frame: str, stamp: int, data: bytes, resolution: float = 0.1, *, binary: bool, id: str) -> tuple[str, Any]:
     name = "octomap_msgs/msg/Octomap"
     return name, T[name](header(frame, stamp), binary, id, resolution, np.frombuffer(data, np.int8))
+
+
+def grid_map(frame: str, stamp: int, layers: dict[str, Any], resolution: float, at: Any, start: Any = (0, 0)) -> Any:
+    """layers: heights (rows, columns) by name, as a grid_map::GridMap has them: row 0 at the greatest x."""
+    name, data = "grid_map_msgs/msg/GridMap", []
+    for heights in layers.values():
+        rows, columns = heights.shape
+        ring = np.roll(heights, start, (0, 1)).astype(np.float32)
+        sizes = [("column_index", columns, rows * columns), ("row_index", rows, rows)]
+        dims = [T["std_msgs/msg/MultiArrayDimension"](*each) for each in sizes]
+        layout = T["std_msgs/msg/MultiArrayLayout"](dims, 0)
+        data.append(T["std_msgs/msg/Float32MultiArray"](layout, ring.T.ravel()))
+    about = T["grid_map_msgs/msg/GridMapInfo"](resolution, rows * resolution, columns * resolution, pose(at))
+    return name, T[name](header(frame, stamp), about, list(layers), [], data, *start)

@@ -37,7 +37,7 @@ NUMBERS: Final = {
 }
 """Keys with a number, their units and defaults."""
 
-KEYS: Final = (*PLACE, *BODY, "covariance", "without", "nan_is_free", "unknown", "updates", "voxels", *NUMBERS)
+KEYS: Final = (*PLACE, *BODY, "covariance", "without", "nan_is_free", "unknown", "updates", "voxels", "layer", *NUMBERS)
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class ObjectEntry:
     monitor's). covariance: whether covariances in the messages are used. without: names of the objects
     whose points a scan leaves out. nan_is_free: whether its NaN mean that nothing is there. unknown: what unknown
     cells of a map are (UNKNOWN_IS). updates: the topic of its updates, or empty. voxels: whether a
-    cloud is cells of the edge `voxel`. given: the keys that the
+    cloud is cells of the edge `voxel`. layer: of the heights of a GridMap. given: the keys that the
     file holds. The numbers are those of NUMBERS.
     """
 
@@ -86,6 +86,7 @@ class ObjectEntry:
     unknown: str = UNKNOWN_IS[0]
     updates: str = ""
     voxels: bool = False
+    layer: str = "elevation"
     min_height: float = 0.0
     max_height: float = 1e9
     ground_slope: float = 0.0
@@ -203,6 +204,7 @@ def _entry(name: str, content: dict[str, Any], object_id: int) -> ObjectEntry:
         unknown=unknown,
         updates=text(content.get("updates", ""), f"{name}, updates"),
         voxels=truth(content.get("voxels", False), f"{name}, voxels"),
+        layer=text(content.get("layer", "elevation"), f"{name}, layer"),
         given=tuple(content),
         **values,
     )
