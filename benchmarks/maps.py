@@ -103,16 +103,15 @@ def leaves(count: int, rough: int) -> Any:
 
 
 def voxels() -> None:
-    """Build voxel maps, beside an octree of FCL."""
+    """Build voxel maps, beside clouds of the same points."""
     for rough in (0, 1):
         cells = leaves(500_000, rough)
         shape = cm.Voxels(cells, EDGE)
         print(f"{len(cells)} leaves, rough by {rough} cells: {shape.face_count} triangles")
         print(f"  surface and tree      {milliseconds(lambda c=cells: kept_tree(cm.Voxels(c, EDGE)), 3):8.1f} ms")
         points = (cells + 0.5) * EDGE
-        print(
-            f"  as cm.Points          {milliseconds(lambda p=points: kept_tree(cm.Points(p[:500_000], EDGE)), 3):8.1f} ms"
-        )
+        cloud = milliseconds(lambda p=points: kept_tree(cm.Points(p[:500_000], EDGE)), 3)
+        print(f"  as cm.Points          {cloud:8.1f} ms")
 
 
 def pairs(count: int) -> None:
@@ -134,9 +133,7 @@ def pairs(count: int) -> None:
         gap = np.concatenate([_gaps(part, low, high) for part in np.array_split(p, 50)]) - radius
         wrong += int((found.overlaps != (gap <= 0.0)).sum())
         worst = max(worst, float(np.abs(found.signed_distance - gap)[gap > 0.0].max()))
-    print(
-        f"{20 * (count // 20)} spheres against brute force: {wrong} overlaps wrong, distances off by at most {worst:.1e} m"
-    )
+    print(f"{20 * (count // 20)} spheres against brute force: {wrong} overlaps wrong, distances off by {worst:.1e} m")
 
 
 def _gaps(p: Any, low: Any, high: Any) -> Any:
