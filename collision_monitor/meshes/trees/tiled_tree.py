@@ -69,7 +69,7 @@ def _tile_trees(tiles: Sequence[Array], known: Sequence[TileTree]) -> list[TileT
 
 
 def _made(tiles: list[Array]) -> list[TileTree]:
-    corners = tiles[0] if len(tiles) == 1 else np.concatenate(tiles)
+    corners = np.concatenate(tiles)  # also of one: the kernel is compiled for arrays that may be written
     begin = np.cumsum([0, *map(len, tiles)])
     first = np.cumsum([0, *(_number_of_blocks(len(tile)) for tile in tiles)])
     blocks = np.zeros((int(first[-1]), ROWS, WIDTH))

@@ -35,7 +35,7 @@ def octomap_voxels(octomap: Any, probability: float) -> Voxels | None:
 
     Raises InputError, ShapeError.
     """
-    data = np.asarray(octomap.data).view(np.uint8)
+    data = np.array(octomap.data, np.int8).view(np.uint8)
     if len(data) > MOST_BYTES:
         raise InputError(f"data: expected an octree of at most {MOST_BYTES} bytes, got {len(data)}")
     is_full = not octomap.binary
@@ -59,6 +59,13 @@ def octomap_voxels(octomap: Any, probability: float) -> Voxels | None:
         raise InputError(f"data: expected the end at byte {at}, got {len(data)} bytes: of another type than stated")
     half = 1 << (DEPTH - 1)
     return Voxels(cells[:count] - half, float(octomap.resolution), edges[:count]) if count else None
+
+
+def load_octree_readers() -> None:
+    """Load the kernels before messages arrive."""
+    cells, edges = np.empty((1, 3), np.int32), np.empty(1, np.int32)
+    _read_binary(np.zeros(2, np.uint8), cells, edges)
+    _read_full(np.zeros(5, np.uint8), 0, np.float32(1.0), cells, edges)
 
 
 @allocating_kernel

@@ -13,7 +13,7 @@ from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
-from collision_monitor.sources.messages.octomap_leaves import octomap_voxels
+from collision_monitor.sources.messages.octomap_leaves import load_octree_readers, octomap_voxels
 
 OCTOMAP: Final = "octomap_msgs/msg/Octomap"
 
@@ -34,6 +34,7 @@ class OctomapSource(Source):
             raise InputError(f"{entry.name}, threshold: expected a probability below 1, got {entry.threshold:g}")
         self.name, self.topics = entry.name, {entry.topic: (message_type,)}
         self._entry = entry
+        load_octree_readers()
         self._waiting: Any = None  # a map whose frame is not known yet
 
     def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
