@@ -30,7 +30,7 @@ setup-demo: ## set up what the demo needs; the rest compiles in the background a
 demo: setup-demo ## play a scene and show the monitor's answers, live in this terminal
 	@$(BIN)/collision-monitor demo
 
-interfaces: setup ## build the message packages that the wheels lack: tf2, vision, autoware, moveit
+interfaces: setup ## build the message packages that the wheels lack: tf2, vision, autoware, moveit, maps
 	@$(BIN)/python scripts/set_up/interfaces.py
 
 test: interfaces ## set up, lint and run every test

@@ -191,6 +191,9 @@ class ShapeType(IntEnum):
     POINTS = 12
     ROUNDED_BOX = 13
     TRUNCATED_CONE = 14
+    GRID = 15
+    VOXELS = 16
+    HEIGHT_FIELD = 17
 
 
 Rows = NDArray[np.void]

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from collision_monitor.alerts.alerts import Alerts
 from collision_monitor.alerts.rules import Rules
 from collision_monitor.geometry.point_tree import PointTree
+from collision_monitor.meshes.trees.shape_trees import shape_tree
 from collision_monitor.monitor.monitor import Monitor
 from collision_monitor.monitor.time_critical import TimeCritical
 from collision_monitor.motion.stated_motion import Motion
@@ -24,7 +25,7 @@ from collision_monitor.objects.models import containing_model
 from collision_monitor.records import MOST_POINTS, STATE, Model
 from collision_monitor.settings.profile import NO_BUDGET, NO_LIMIT, Profile
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.registry import Box, ConvexHull, Mesh, Points, Shape, Sphere
+from collision_monitor.shapes.registry import Box, ConvexHull, Grid, Mesh, Points, Shape, Sphere
 
 Array = NDArray[np.float64]
 
@@ -67,6 +68,7 @@ def _step_certain(monitor: Monitor) -> tuple[Array, Array]:
     containing_model([(ConvexHull(corners), Pose())], Model.AABB)
     PointTree(corners, corners).exceeds(corners, corners[:, 0], np.eye(4), corners[:, 0])  # for large meshes
     containing_model([(tetrahedron, Pose())], Model.AABB)
+    shape_tree(Grid(np.arange(200).reshape(1, 200) % 100 == 0, 1.0))  # a map, of two tiles
     monitor.add(OBJECTS - 1, tetrahedron, replace=True)  # a convex mesh names its features by a kernel of its own
     poses = np.zeros((OBJECTS, 7))
     poses[:, 6] = 1.0

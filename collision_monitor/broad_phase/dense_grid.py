@@ -45,7 +45,7 @@ _FIRST, _COUNT, _BASE, _MODE, _NX, _NY, _NZ, _STRIP = range(8)
 _INVERSE, _REACH, _LARGEST = range(3)
 
 
-class Grid(NamedTuple):
+class CellGrid(NamedTuple):
     """Scratch memory for N bodies. Classes of bodies that start a search come first; class 0 is the unbounded ones."""
 
     klass: Any  # (N,) uint8
@@ -65,10 +65,10 @@ class Bounds(NamedTuple):
     balls: bool
 
 
-def make_grid(capacity: int) -> Grid:
+def make_grid(capacity: int) -> CellGrid:
     """Allocate scratch memory for up to `capacity` bodies."""
     cells = DENSE * capacity + (ABSENT + 1) * FEWEST_CELLS
-    return Grid(
+    return CellGrid(
         klass=np.zeros(capacity, np.uint8),
         bucket=np.zeros(capacity, np.int32),
         start=np.zeros(cells + 2, np.int32),

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from collision_monitor._jit import device, inlined
 from collision_monitor._jit.vectors import LANES
 from collision_monitor.broad_phase.box_pairs import boxes_at, sort_boxes
-from collision_monitor.broad_phase.dense_grid import PAD, Grid, make_grid
+from collision_monitor.broad_phase.dense_grid import PAD, CellGrid, make_grid
 from collision_monitor.broad_phase.hashed_grid import read_boxes
 from collision_monitor.broad_phase.lanes import boxes_overlap, lowest_bit
 
@@ -26,7 +26,7 @@ MOST_CHANGED: Final = 8.0
 class SortedBoxes(NamedTuple):
     """N boxes by cell, and a list of up to M that have changed."""
 
-    grid: Grid
+    grid: CellGrid
     extent: Any  # (3, N + PAD) float64: half extents (m), sorted by cell; NaN: no box
     place: Any  # (N,) int32: place of a box in the list; -1: it has not changed
     changed: Any  # (M,) int32: the boxes in the list

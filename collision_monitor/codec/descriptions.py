@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from collision_monitor.codec.cdr import Buffer, Floats, Ids, Reader, Writer, write_header
-from collision_monitor.codec.shape_fields import LEAST_SHAPE, make_shape, read_shape, write_shape
+from collision_monitor.codec.shape_fields import LEAST_SHAPE, RawShape, make_shape, read_shape, write_shape
 from collision_monitor.errors import InputError, ShapeError, reason_of
 from collision_monitor.objects.description import MOST_SHAPES, ObjectDescription
 from collision_monitor.shapes.pose import Pose
@@ -51,7 +51,7 @@ class _Fields:
     object_id: int
     operation: int
     name: str
-    shapes: list[tuple[int, Floats, Floats, Ids]]
+    shapes: list[RawShape]
     shape_poses: Floats
     static: bool
     pose: Floats
@@ -125,7 +125,7 @@ def _change(it: _Fields) -> Change:
     poses = [_pose(row) for row in it.shape_poses] or [_IDENTITY] * len(it.shapes)
     return ObjectDescription(
         object_id=it.object_id,
-        shapes=[(make_shape(*shape), pose) for shape, pose in zip(it.shapes, poses, strict=True)],
+        shapes=[(make_shape(shape), pose) for shape, pose in zip(it.shapes, poses, strict=True)],
         name=it.name,
         static=it.static,
         pose=_pose(it.pose) if it.static else None,

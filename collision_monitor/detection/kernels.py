@@ -19,7 +19,7 @@ from collision_monitor.broad_phase.dense_grid import (
     AHEAD,
     PAD,
     Bounds,
-    Grid,
+    CellGrid,
     find_buckets,
     gather_centres,
     partners,
@@ -343,7 +343,7 @@ def _write(positions: Any, frame: Any, hits: Any, total: int, pairs: Any, contac
 
 # Index of the first array of each tuple in the argument `memory` of a kernel.
 _GRID: Final = len(ShapeTable._fields)
-_FRAME: Final = _GRID + len(Grid._fields)
+_FRAME: Final = _GRID + len(CellGrid._fields)
 _HITS: Final = _FRAME + len(Frame._fields)
 _END: Final = _HITS + len(Hits._fields)
 
@@ -385,7 +385,7 @@ def detect(path: int, limit: float, positions: Any, quaternions: Any, pairs: Any
     memory: the arrays of the shape table, the grid, the frame and the hits. A separate array argument costs 20 ns, an
     array in a named tuple 200 ns.
     """
-    table, grid = ShapeTable(*memory[:_GRID]), Grid(*memory[_GRID:_FRAME])
+    table, grid = ShapeTable(*memory[:_GRID]), CellGrid(*memory[_GRID:_FRAME])
     frame, hits = Frame(*memory[_FRAME:_HITS]), Hits(*memory[_HITS:_END])
     blocks = frame.bounds.shape[0]
     if not _into_cells(positions, grid, frame):
@@ -410,7 +410,7 @@ def detect_parallel(
 
     The parallel loop's b is cast to its type in `detect`, so that both share their compiled stages.
     """
-    table, grid = ShapeTable(*memory[:_GRID]), Grid(*memory[_GRID:_FRAME])
+    table, grid = ShapeTable(*memory[:_GRID]), CellGrid(*memory[_GRID:_FRAME])
     frame, hits = Frame(*memory[_FRAME:_HITS]), Hits(*memory[_HITS:_END])
     blocks = frame.bounds.shape[0]
     if not _into_cells(positions, grid, frame):

@@ -53,5 +53,7 @@ MOST_PARTS: Final = 64
 """Most parts with a point in the tree. More: a soup of a million triangles would take a million rays."""
 COUNT: Final = 6
 """Number of points of a cloud; 0 for triangles."""
+TILES: Final = 7
+"""Number of tiles of a map, each with a tree of its own below the boxes over them; 0 for other surfaces."""
 KEY: Final = 4
 """Digest of what a tree of triangles is made of, 16 bytes in this row and the next; so equal trees have equal ones."""

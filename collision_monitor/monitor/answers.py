@@ -71,6 +71,7 @@ class Answers(Stage):
                 table = faces.table(len(multibody.table.kind))
                 scratch = np.empty((1, 4)), np.empty((2, 3, 3))
                 name_mesh_features(multibody, active.pairs, active.results, step.now, table, scratch)
+            _doubt_contacts(step.roster.unsure, active)
             index, bodies = multibody.parts.index, step.roster.bodies
             n = write_contacts(active.pairs, active.results, bodies, index, limits, details, contacts)
             contacts = contacts[:n]
@@ -91,7 +92,7 @@ class Answers(Stage):
         slots = np.empty((len(predictions), 2), np.int32)
         if not len(predictions):
             return predictions, slots
-        predicted = Predicted(active.pairs, active.events, pending)
+        predicted = Predicted(active.pairs, *(_doubted(roster.unsure, each) for each in (active.events, pending)))
         times = Times(step.now, p.horizon, p.stale_after)
         n = write_predictions(predicted, roster.bodies, roster.parts.index, times, predictions, slots)
         return predictions[:n], slots[:n]
@@ -143,6 +144,26 @@ class Answers(Stage):
             contacts = snapshot.array("contacts", np.empty(0, records.CONTACT))
             predictions = snapshot.array("predictions", np.empty(0, records.PREDICTION))
             self.last = StepResult(stamp_ns, step, contacts, predictions, StepStatus(**status))
+
+
+def _doubt_contacts(unsure: set[int], active: ActivePairs) -> None:
+    """Make the contacts with shapes that may not be there UNRESOLVED. unsure: their slots."""
+    if not unsure:
+        return
+    shapes = active.results[:, [SHAPE_I, SHAPE_J]]
+    may_be = np.isin(shapes, list(unsure)).any(axis=1) & (active.pairs["touching"] == 1)
+    active.results[may_be, STATUS] = UNSETTLED
+
+
+def _doubted(unsure: set[int], events: Rows) -> Rows:
+    """The events (IMPACT), of which those with shapes that may not be there are UNRESOLVED. unsure: their slots."""
+    if not unsure:
+        return events
+    slots = list(unsure)
+    may_be = np.isin(events["shape_i"], slots) | np.isin(events["shape_j"], slots)
+    events = events.copy()
+    events["status"][may_be], events["upper"][may_be] = UNRESOLVED, inf
+    return events
 
 
 def step_status(

@@ -21,6 +21,7 @@ from collision_monitor.objects.closed_parts import separated
 from collision_monitor.objects.convex_decomposition import convex_decomposition
 from collision_monitor.objects.excess import MANY_FACES, PosedShapes, enclosing_points, excess_of, excess_of_large
 from collision_monitor.records import Model
+from collision_monitor.shapes.cells.tiled_solid import TiledSolid
 from collision_monitor.shapes.convex_pieces import convex_pieces, is_concave_mesh
 from collision_monitor.shapes.planar import is_planar
 from collision_monitor.shapes.pose import Pose
@@ -68,7 +69,7 @@ def parse_model(model: Model | str | int) -> Model:
 
 def shape_class(shapes: Sequence[tuple[Shape, Pose]]) -> str | None:
     """Class of an object: primitive, hull, mesh or compound, each with a setting; None if there is no coarser model."""
-    if any(is_planar(shape) or isinstance(shape, HalfSpace | Points) for shape, _ in shapes):
+    if any(is_planar(shape) or isinstance(shape, HalfSpace | Points | TiledSolid) for shape, _ in shapes):
         return None
     if len(shapes) > 1:
         return "compound"
@@ -159,10 +160,16 @@ def _separated(shapes: Sequence[tuple[Shape, Pose]]) -> tuple[PosedShapes, list[
     """The shapes, with the closed parts and the sheets of each mesh apart; and the index of each in `shapes`."""
     pairs, index = [], []
     for k, (shape, pose) in enumerate(shapes):
-        for part in separated(shape) if isinstance(shape, Mesh) else (shape,):
+        for part in _solids_of(shape):
             pairs.append((part, pose))
             index.append(k)
     return pairs, index
+
+
+def _solids_of(shape: Shape) -> Sequence[Shape]:
+    if isinstance(shape, TiledSolid):
+        return shape.solids
+    return separated(shape) if isinstance(shape, Mesh) else (shape,)
 
 
 def exact_model(shapes: Sequence[tuple[Shape, Pose]]) -> Modelled:

@@ -21,6 +21,7 @@ from collision_monitor.pipeline.catalogue import Catalogue
 from collision_monitor.pipeline.preparation import STAYS, Job, Preparation
 from collision_monitor.pipeline.state_intake import is_in_frame
 from collision_monitor.records import Model
+from collision_monitor.shapes.registry import Grid
 
 Budgets = tuple[Budget, Budget]
 """Of one message: for the objects with their own models, and for the boxes."""
@@ -78,6 +79,7 @@ class ShapeIntake:
                 self._monitor.remove(change.object_id)
             else:
                 was_known = change.object_id in self._monitor
+                _share_tiles(change, self._catalogue.descriptions.get(change.object_id))
                 own, boxes = budgets
                 boxed = self._describe(change, stamp_ns, own, ready)
                 if boxed is not None:
@@ -162,6 +164,13 @@ class ShapeIntake:
     @property
     def _refusals(self) -> int:
         return sum(self._monitor.refused.values())
+
+
+def _share_tiles(new: ObjectDescription, known: ObjectDescription | None) -> None:
+    """Let the grids of an object that is described again take over the tiles that did not change."""
+    for (shape, _), (old, _) in zip(new.shapes, known.shapes if known is not None else (), strict=False):
+        if isinstance(shape, Grid) and isinstance(old, Grid):
+            shape.share_tiles(old)
 
 
 def _about(object_id: int, text: str) -> str:

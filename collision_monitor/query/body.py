@@ -16,6 +16,7 @@ from collision_monitor.meshes.trees.shape_trees import CERTAIN, NEVER, UNCERTAIN
 from collision_monitor.objects.models import containing_kdop, containing_model, exact_model, parse_model
 from collision_monitor.query.library import LIBRARY, WITH_TREE, Slots
 from collision_monitor.records import Model
+from collision_monitor.shapes.cells.tiled_solid import is_unsure
 from collision_monitor.shapes.compound import Compound, shape_pairs
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
 from collision_monitor.shapes.pose import Pose
@@ -52,7 +53,7 @@ class KeptSlots:
             self.has_mesh = any(isinstance(each, WITH_TREE) for each, _ in found)
             self.is_convex = len(found) == 1 and not self.has_mesh
             # a plane shape, whose pose has to be checked, and several pieces are completed like what is uncertain
-            is_answered = len(found) == 1 and isinstance(shape, Mesh)
+            is_answered = len(found) == 1 and isinstance(shape, Mesh) and not is_unsure(found[0][0])
             self.inside = kept_tree(shape).inside if is_answered else UNCERTAIN
             if not (len(found) == 1 and found[0][0] is shape):
                 self.pieces = found
@@ -104,6 +105,14 @@ class QueryBody:
         return self.has_mesh or len(self.pieces) > 1
 
     @cached_property
+    def certain(self) -> QueryBody | None:
+        """The object without what may not be there, as unknown cells of a map; None: nothing of it is certain."""
+        pieces = [(shape, pose) for shape, pose in self.pieces if not is_unsure(shape)]
+        if len(pieces) == len(self.pieces):
+            return self
+        return QueryBody(pieces, pieces, laid_out(pieces), self.model, self.excess) if pieces else None
+
+    @cached_property
     def stands_for_concave(self) -> bool:
         """Whether the object itself has several convex pieces, whatever its model is."""
         shapes = self.shapes
@@ -114,7 +123,7 @@ class QueryBody:
         """What is known of the inside of its meshes: CERTAIN, NEVER or UNCERTAIN (meshes/trees/shape_trees.py)."""
         if self.model is not Model.EXACT:
             return CERTAIN
-        known = [kept_tree(shape).inside for shape, _ in self.shapes if isinstance(shape, Mesh)]
+        known = [kept_tree(shape).inside for shape, _ in self.pieces if isinstance(shape, Mesh)]
         return UNCERTAIN if UNCERTAIN in known else NEVER if NEVER in known else CERTAIN
 
     @cached_property

@@ -13,6 +13,7 @@ from collision_monitor.geometry.point_tree import PointTree
 from collision_monitor.geometry.polygons import is_convex
 from collision_monitor.geometry.qhull import HEIGHTS_AT_ONCE
 from collision_monitor.geometry.triangulation import convex_parts
+from collision_monitor.shapes.cells.tiled_solid import TiledSolid
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import ConvexHull, Mesh, Points, Polygon, Shape, Triangle
 from collision_monitor.shapes.shape import array_bytes
@@ -69,7 +70,12 @@ def _own_memory(_: bool, mesh: Mesh) -> int:
 
 @bounded_cache(REMEMBERED_PIECES, _own_memory)
 def is_convex_mesh(mesh: Mesh) -> bool:
-    """Whether a mesh bounds a solid and no vertex is outside the plane of any face, up to round-off."""
+    """Whether a mesh bounds a solid and no vertex is outside the plane of any face, up to round-off.
+
+    A map is not asked: its tree answers for it, whatever its cells are.
+    """
+    if isinstance(mesh, TiledSolid):
+        return False
     if not (mesh.surface.closed and len(mesh.surface.faces)):
         return False
     faces = mesh.surface.faces

@@ -36,6 +36,7 @@ class Fields(NamedTuple):
     dimensions: tuple[float, ...]
     vertices: Array = np.zeros((0, 3))
     triangles: NDArray[Any] = np.zeros((0, 3), np.uint32)
+    data: NDArray[np.uint8] = np.zeros(0, np.uint8)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,8 +50,8 @@ class Kind:
     dimensions: str = ""
     """What the numbers of a message mean, as "radius, length"; empty: it may have none."""
     fields: Callable[[Any], Fields]
-    make: Callable[[list[float], Array, NDArray[Any]], Shape]
-    """The shape of a message's dimensions, vertices (n, 3) and triangles (k,). Raises ShapeError."""
+    make: Callable[[Fields], Shape]
+    """The shape of a message's dimensions, vertices (n, 3), triangles (k,) and data (b,). Raises ShapeError."""
 
     row: Callable[[Any, Corners | None], Row | None]
     """Its slot of the table, with its corners if they are known already; None: kernels see a tree of its surface."""
@@ -98,6 +99,6 @@ def fields_of(*names: str) -> Callable[[Any], Fields]:
     return lambda shape: Fields(tuple(getattr(shape, name) for name in names))
 
 
-def made_of(shape: type[Any]) -> Callable[[list[float], Array, NDArray[Any]], Shape]:
+def made_of(shape: type[Any]) -> Callable[[Fields], Shape]:
     """`make` of a shape that takes the numbers one by one."""
-    return lambda dimensions, vertices, triangles: shape(*dimensions)
+    return lambda fields: shape(*fields.dimensions)

@@ -17,13 +17,16 @@ from collision_monitor.shapes.kinds import (
     convex_hull,
     cylinder,
     ellipsoid,
+    grid,
     half_space,
+    height_field,
     mesh,
     points,
     polygon,
     rounded_box,
     sphere,
     truncated_cone,
+    voxels,
 )
 from collision_monitor.shapes.kinds.box import Box as Box
 from collision_monitor.shapes.kinds.capsule import Capsule as Capsule
@@ -33,18 +36,21 @@ from collision_monitor.shapes.kinds.convex_hull import ConvexHull as ConvexHull
 from collision_monitor.shapes.kinds.convex_hull import Triangle as Triangle
 from collision_monitor.shapes.kinds.cylinder import Cylinder as Cylinder
 from collision_monitor.shapes.kinds.ellipsoid import Ellipsoid as Ellipsoid
+from collision_monitor.shapes.kinds.grid import Grid as Grid
 from collision_monitor.shapes.kinds.half_space import HalfSpace as HalfSpace
+from collision_monitor.shapes.kinds.height_field import HeightField as HeightField
 from collision_monitor.shapes.kinds.mesh import Mesh as Mesh
 from collision_monitor.shapes.kinds.points import Points as Points
 from collision_monitor.shapes.kinds.polygon import Polygon as Polygon
 from collision_monitor.shapes.kinds.rounded_box import RoundedBox as RoundedBox
 from collision_monitor.shapes.kinds.sphere import Sphere as Sphere
 from collision_monitor.shapes.kinds.truncated_cone import TruncatedCone as TruncatedCone
+from collision_monitor.shapes.kinds.voxels import Voxels as Voxels
 from collision_monitor.shapes.shape import Shape as Shape
 
 __all__ = [
-    "Box", "Capsule", "Circle", "Cone", "ConvexHull", "Cylinder", "Ellipsoid", "HalfSpace", "Mesh", "Points", "Polygon",
-    "RoundedBox", "Sphere", "TruncatedCone",
+    "Box", "Capsule", "Circle", "Cone", "ConvexHull", "Cylinder", "Ellipsoid", "Grid", "HalfSpace", "HeightField",
+    "Mesh", "Points", "Polygon", "RoundedBox", "Sphere", "TruncatedCone", "Voxels",
 ]  # fmt: skip
 """The public classes, for type checkers of `collision_monitor`."""
 
@@ -52,7 +58,7 @@ KINDS: Final[tuple[Kind, ...]] = tuple(
     each.KIND
     for each in (
         sphere, box, capsule, cylinder, cone, convex_hull, mesh, half_space, circle, polygon, ellipsoid, points,
-        rounded_box, truncated_cone,
+        rounded_box, truncated_cone, grid, voxels, height_field,
     )
 )  # fmt: skip
 """Every kind that a message may hold, in the order of its numbers."""
@@ -91,7 +97,7 @@ BALL: Final = _array("ball")
 KIND_NAMES: Final = {int(kind.number): kind.name for kind in KINDS}
 """Names for texts, such as those of a scene plan."""
 
-_SLOTS: Final = [kind for kind in KINDS if kind not in (mesh.KIND, points.KIND)]
+_SLOTS: Final = [kind for kind in KINDS if not issubclass(kind.shape, Mesh | Points)]
 
 SUPPORTED_SHAPES: Final = ", ".join(
     [kind.shape.__name__ for kind in _SLOTS if not kind.planar]

@@ -27,8 +27,8 @@ class Shape:
 
 
 def array_bytes(shape: Shape) -> int:
-    """Bytes of the arrays of a shape: its points and faces."""
-    return sum(value.nbytes for value in vars(shape).values() if isinstance(value, np.ndarray))
+    """Bytes of the arrays of a shape: its points and faces, or its cells."""
+    return sum(value.nbytes for value in shape.__getstate__().values() if isinstance(value, np.ndarray))
 
 
 def positive(value: float, what: str, *, or_zero: bool = False) -> float:

@@ -17,6 +17,8 @@ from collision_monitor.errors import InputError, ShapeError, UnsupportedError
 from collision_monitor.shapes.forest import REACH, Forest
 from collision_monitor.shapes.kind import Row
 from collision_monitor.shapes.kinds.convex_hull import CONVEX_HULL, TRIANGLE_RING
+from collision_monitor.shapes.kinds.mesh import MESH
+from collision_monitor.shapes.kinds.points import POINTS
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import SUPPORTED_SHAPES, Points, Shape, kind_of
 
@@ -183,7 +185,8 @@ class ShapeTableBuilder:
         kind = kind_of(shape)
         row = kind.row(shape, corners)
         if row is None and tree is not None:
-            row = Row(int(kind.number), (), float(tree[REACH]), shape.radius if isinstance(shape, Points) else 0.0)
+            number = POINTS if isinstance(shape, Points) else MESH  # also of a map
+            row = Row(number, (), float(tree[REACH]), shape.radius if isinstance(shape, Points) else 0.0)
         if row is None:
             raise UnsupportedError(f"{type(shape).__name__} has no narrow phase; supported are {SUPPORTED_SHAPES}")
         start, count = (0, 0) if row.ring is None or row.points is None else self._share(row.points, row.ring)

@@ -28,6 +28,7 @@ from collision_monitor.sources.ground.source_time import MAX_TIME_STEP, MessageS
 from collision_monitor.sources.ground.unmonitored import Unmonitored
 from collision_monitor.sources.ground.waiting_states import Step
 from collision_monitor.sources.kinds import BY_TYPE, beside_topics
+from collision_monitor.sources.messages.grids import UPDATES
 from collision_monitor.sources.messages.static_objects import StandingObjects
 from collision_monitor.sources.messages.tf_objects import FrameSource
 from collision_monitor.sources.messages.transform_arrays import TRANSFORMS, TransformArrays
@@ -130,16 +131,17 @@ class Feed:
         found: dict[str, tuple[str, ...]] = {}
         for topic, entries in self.mapping.topics.items():
             found[topic] = tuple({entry.type: None for entry in entries if entry.type}) or tuple(BY_TYPE)
-        for source in self._sources:
-            found.update(source.topics)
-        return found
+            found.update({entry.updates: tuple(UPDATES.values()) for entry in entries if entry.updates})
+        return found | {topic: types for source in self._sources for topic, types in source.topics.items()}
 
     def bind(self, topic: str, message_type: str) -> dict[str, str]:
         """Make the sources of a topic of `objects:`. Return the reason for each entry that does not fit the type."""
         problems = {}
         for entry in self.mapping.topics.get(topic, ()):
             try:
-                self._add(self._source(entry, message_type), [topic])
+                source = self._source(entry, message_type)
+                self._add(source, source.topics)
+                self.owners.update(dict.fromkeys(source.topics.keys() - self._lines.keys(), entry.name))
             except InputError as error:
                 problems[entry.name] = str(error)
         return problems
@@ -168,7 +170,8 @@ class Feed:
 
     def miss_topic(self, topic: str, reason: str, now_ns: int) -> None:
         """Note why nothing of a topic is monitored: no publisher, another type. A message ends that."""
-        if not all(each.awaited for each in self._by_topic.get(topic, ())):
+        is_optional = topic in {entry.updates for entry in self.mapping.sources}
+        if is_optional or not all(each.awaited for each in self._by_topic.get(topic, ())):
             return
         for line in self.lines_of(topic):
             self.scene.unmonitored.lacks(line, topic, reason, now_ns)

@@ -12,7 +12,10 @@ from collision_monitor.sources.messages.autoware import PREDICTED, TRACKED, Auto
 from collision_monitor.sources.messages.clouds import CLOUD, SCAN, CloudSource
 from collision_monitor.sources.messages.detections import DETECTIONS, DetectionSource
 from collision_monitor.sources.messages.footprints import FOOTPRINT, FootprintSource
+from collision_monitor.sources.messages.grid_maps import GRID_MAP, GridMapSource
+from collision_monitor.sources.messages.grids import COSTMAP, GRID, GridSource
 from collision_monitor.sources.messages.markers import MARKER, MARKERS, MarkerSource
+from collision_monitor.sources.messages.octomaps import OCTOMAP, OctomapSource
 from collision_monitor.sources.messages.poses import ODOMETRY, POSE, POSE_WITH_COVARIANCE, PoseSource
 from collision_monitor.sources.messages.tf_objects import TRANSFORMS, FrameSource
 from collision_monitor.sources.plans.path_source import make_plans
@@ -35,6 +38,10 @@ BY_TYPE: Final[dict[str, Callable[[ObjectEntry, str, Mapping], Source]]] = {
     FOOTPRINT: FootprintSource,
     SCAN: CloudSource,
     CLOUD: CloudSource,
+    GRID: GridSource,
+    COSTMAP: GridSource,
+    OCTOMAP: OctomapSource,
+    GRID_MAP: GridMapSource,
 }
 """Makes the source of an entry of `objects:` from the entry, the type of its topic, and the whole file. Raises
 InputError for an entry that does not fit the type."""

@@ -9,7 +9,10 @@ from collision_monitor.sources.messages.autoware import PREDICTED, TRACKED
 from collision_monitor.sources.messages.clouds import CLOUD, SCAN
 from collision_monitor.sources.messages.detections import DETECTIONS
 from collision_monitor.sources.messages.footprints import FOOTPRINT
+from collision_monitor.sources.messages.grid_maps import GRID_MAP
+from collision_monitor.sources.messages.grids import COSTMAP, GRID
 from collision_monitor.sources.messages.markers import MARKER, MARKERS
+from collision_monitor.sources.messages.octomaps import OCTOMAP
 from collision_monitor.sources.messages.poses import ODOMETRY, POSE, POSE_WITH_COVARIANCE
 from collision_monitor.sources.robot.planning_scene import COLLISION_OBJECT, PLANNING_SCENE
 from collision_monitor.sources.robot.robot_template import robot_lines
@@ -24,6 +27,10 @@ _ENTRIES: Final = {
     FOOTPRINT: "height: 1.0",
     SCAN: "radius: 0.05, voxel: 0.1",
     CLOUD: "radius: 0.05, voxel: 0.1",
+    GRID: "height: 2.0, unknown: unresolved",
+    COSTMAP: "height: 2.0, unknown: unresolved",
+    OCTOMAP: "threshold: 0.5",
+    GRID_MAP: "layer: elevation",
 }
 """The keys of an entry besides its topic. Sizes are to be replaced by the real ones."""
 

@@ -1,4 +1,4 @@
-"""Build the message packages of `interfaces/` that this machine lacks: tf2, vision, autoware, moveit, and their needs.
+"""Build the message packages of `interfaces/` that this machine lacks: tf2, vision, autoware, moveit, maps, and more.
 
 The definitions have exactly the fields of the published ones, so messages and type hashes agree. A package that a
 sourced ROS 2 install has is left out and never shadowed. The others go into `.venv`, once: a second run only compares.

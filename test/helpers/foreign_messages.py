@@ -112,3 +112,50 @@ def point_cloud(frame: str, stamp: int, points: Any, *, gap: int = 4) -> tuple[s
     return name, T[name](
         header(frame, stamp), 1, len(points), fields, False, 12 + gap, (12 + gap) * len(points), data, False
     )
+
+
+def occupancy_grid(
+    frame: str, stamp: int, cells: Any, resolution: float = 0.5, p: Any = (0, 0, 0), q: Any = (0, 0, 0, 1)
+) -> tuple[str, Any]:
+    name, values = "nav_msgs/msg/OccupancyGrid", np.asarray(cells, np.int8)
+    time = header(frame, stamp).stamp
+    about = T["nav_msgs/msg/MapMetaData"](time, resolution, values.shape[1], values.shape[0], pose(p, q))
+    return name, T[name](header(frame, stamp), about, values.ravel())
+
+
+def occupancy_update(frame: str, stamp: int, row: int, column: int, cells: Any) -> tuple[str, Any]:
+    name, values = "map_msgs/msg/OccupancyGridUpdate", np.asarray(cells, np.int8)
+    return name, T[name](header(frame, stamp), column, row, values.shape[1], values.shape[0], values.ravel())
+
+
+def costmap(frame: str, stamp: int, cells: Any, resolution: float = 0.5) -> tuple[str, Any]:
+    name, values = "nav2_msgs/msg/Costmap", np.asarray(cells, np.uint8)
+    time = header(frame, stamp).stamp
+    about = T["nav2_msgs/msg/CostmapMetaData"](
+        time, time, "", resolution, values.shape[1], values.shape[0], pose((0, 0, 0))
+    )
+    return name, T[name](header(frame, stamp), about, values.ravel())
+
+
+def costmap_update(frame: str, stamp: int, row: int, column: int, cells: Any) -> tuple[str, Any]:
+    name, values = "nav2_msgs/msg/CostmapUpdate", np.asarray(cells, np.uint8)
+    return name, T[name](header(frame, stamp), column, row, values.shape[1], values.shape[0], values.ravel())
+
+
+def octomap(frame: str, stamp: int, data: bytes, resolution: float = 0.1, *, binary: bool, id: str) -> tuple[str, Any]:
+    name = "octomap_msgs/msg/Octomap"
+    return name, T[name](header(frame, stamp), binary, id, resolution, np.frombuffer(data, np.int8))
+
+
+def grid_map(frame: str, stamp: int, layers: dict[str, Any], resolution: float, at: Any, start: Any = (0, 0)) -> Any:
+    """layers: heights (rows, columns) by name, as a grid_map::GridMap has them: row 0 at the greatest x."""
+    name, data = "grid_map_msgs/msg/GridMap", []
+    for heights in layers.values():
+        rows, columns = heights.shape
+        ring = np.roll(heights, start, (0, 1)).astype(np.float32)
+        sizes = [("column_index", columns, rows * columns), ("row_index", rows, rows)]
+        dims = [T["std_msgs/msg/MultiArrayDimension"](*each) for each in sizes]
+        layout = T["std_msgs/msg/MultiArrayLayout"](dims, 0)
+        data.append(T["std_msgs/msg/Float32MultiArray"](layout, ring.T.ravel()))
+    about = T["grid_map_msgs/msg/GridMapInfo"](resolution, rows * resolution, columns * resolution, pose(at))
+    return name, T[name](header(frame, stamp), about, list(layers), [], data, *start)

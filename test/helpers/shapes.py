@@ -26,12 +26,18 @@ EXAMPLES: Final[dict[ShapeType, Shape]] = {
     ShapeType.POINTS: cm.Points(np.random.default_rng(2).uniform(-0.5, 0.5, (20, 3)), 0.05),
     ShapeType.ROUNDED_BOX: cm.RoundedBox((1.0, 0.8, 0.6), 0.15),
     ShapeType.TRUNCATED_CONE: cm.TruncatedCone(0.5, 0.2, 1.0),
+    ShapeType.GRID: cm.Grid([[True, True, False], [True, False, False], [True, False, True]], 0.3, height=0.8),
+    ShapeType.VOXELS: cm.Voxels([(0, 0, 0), (2, 0, 0), (2, 1, 0), (0, 2, -1)], 0.25, edges=[2, 1, 1, 1]),
+    ShapeType.HEIGHT_FIELD: cm.HeightField([[0.0, 0.3, 0.1], [0.2, 0.5, 0.0], [0.1, 0.2, 0.4]], 0.4, base=-0.3),
 }
+
+WITH_TREES: Final = (ShapeType.MESH, ShapeType.POINTS, ShapeType.GRID, ShapeType.VOXELS, ShapeType.HEIGHT_FIELD)
+"""Those whose surface a tree represents."""
 
 CONVEX_SOLIDS: Final = {
     number: shape
     for number, shape in EXAMPLES.items()
-    if number not in (ShapeType.MESH, ShapeType.POINTS, ShapeType.HALF_SPACE, ShapeType.CIRCLE, ShapeType.POLYGON)
+    if number not in (*WITH_TREES, ShapeType.HALF_SPACE, ShapeType.CIRCLE, ShapeType.POLYGON)
 }
 """Those with a bounded volume, which a slot of the shape table represents."""
 

@@ -12,7 +12,9 @@ from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.bounding_volumes import convex_hull
 from collision_monitor.meshes.distance.contact import tree_reach
 from collision_monitor.meshes.trees.cloud_tree import cloud_tree
+from collision_monitor.meshes.trees.tiled_tree import map_tree
 from collision_monitor.meshes.trees.tree import tree_of
+from collision_monitor.shapes.cells.tiled_solid import TiledSolid
 from collision_monitor.shapes.convex_pieces import is_concave_mesh
 from collision_monitor.shapes.registry import Box, Capsule, ConvexHull, Mesh, Points, Shape, Sphere, Triangle
 
@@ -68,6 +70,10 @@ def _plate(box: Box) -> Array:
 def made_tree(shape: Shape, split: int = 0) -> Array | None:
     """As `shape_tree`, but made anew; split: of a mesh's faces, see `tree_of`."""
     match shape:
+        case TiledSolid():
+            made = map_tree(shape.tiles, shape.__dict__.pop("former_tree", None))
+            shape.__dict__["map_tree"] = made
+            return made.blocks
         case Mesh():
             surface = shape.surface
             faces = surface.faces if len(surface.faces) else shape.faces[:1]
@@ -93,4 +99,3 @@ def made_tree(shape: Shape, split: int = 0) -> Array | None:
         case Triangle():
             return tree_of(shape.points[None])
     return None
-

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 from collision_monitor.errors import InputError
 from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.shapes.cells.tiled_solid import TiledSolid
 from collision_monitor.shapes.registry import Mesh, Points
 from collision_monitor.shapes.shape import array_bytes
 
@@ -23,6 +24,9 @@ COPIES: Final = 4
 """How often the arrays of a shape are kept: in the description, in the table of shapes and in the key of its block; and
 the table has up to twice the room that it needs."""
 
+TILE_COPIES: Final = 3
+"""How often the triangles of a map are kept: in their tiles, in the tree of each tile and in that of the map."""
+
 TREE_BYTES: Final = 330
 """Memory of a triangle or a point in its tree: 150 to 220 bytes, and the array of all trees may have half as much room
 again. A face of a convex mesh takes 104 bytes, twice that while the faces are packed, and its hull may have a tree."""
@@ -31,7 +35,8 @@ again. A face of a convex mesh takes 104 bytes, twice that while the faces are p
 def object_memory(d: ObjectDescription) -> int:
     """Return the memory that a described object needs (bytes), rounded up."""
     shapes = sum(SHAPE_BYTES + COPIES * array_bytes(shape) for shape, _ in d.shapes)
-    leaves = sum(len(shape.faces) for shape, _ in d.shapes if isinstance(shape, Mesh))
+    meshes = [shape for shape, _ in d.shapes if isinstance(shape, Mesh)]
+    leaves = sum(TILE_COPIES * each.face_count if isinstance(each, TiledSolid) else len(each.faces) for each in meshes)
     leaves += sum(len(shape.points) for shape, _ in d.shapes if isinstance(shape, Points))
     return OBJECT_BYTES + shapes + TREE_BYTES * leaves + ALLOWED_BYTES * len(d.allowed)
 

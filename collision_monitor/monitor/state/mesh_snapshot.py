@@ -21,7 +21,8 @@ from collision_monitor.tolerances import LARGEST_INPUT
 def mesh_arrays(table: ShapeTable) -> dict[str, NDArray[Any]]:
     """Arrays that describe the meshes of a table; none if it has none. Equal meshes are saved once.
 
-    meshes.of: the mesh of each slot with one. By mesh: numbers of triangles and of parts, and whether it is closed.
+    meshes.of: the mesh of each slot with one. By mesh: numbers of triangles, of parts and of tiles, and whether it is
+    closed. meshes.tiles: numbers of triangles of the tiles of all meshes.
     meshes.corners (m, 3, 3) and meshes.points (k, 3): those of all meshes, one after another.
     clouds.of: the cloud of each slot with one. clouds.count: the number of points of each cloud. clouds.points (n, 3).
     """
@@ -51,6 +52,8 @@ def _triangles(table: ShapeTable) -> dict[str, NDArray[Any]]:
         "meshes.of": of.astype(np.int32),
         "meshes.triangles": np.array([len(each.corners) for each in found], np.int32),
         "meshes.parts": np.array([len(each.parts) for each in found], np.int32),
+        "meshes.tile_counts": np.array([len(each.tiles) for each in found], np.int32),
+        "meshes.tiles": np.concatenate([each.tiles for each in found]).astype(np.int32),
         "meshes.closed": np.array([each.closed for each in found], np.bool_),
         "meshes.corners": np.concatenate([each.corners for each in found]),
         "meshes.points": np.concatenate([each.parts for each in found]),
@@ -92,8 +95,17 @@ def _plant_triangles(builder: ShapeTableBuilder, snapshot: Snapshot) -> None:
     parts = snapshot.array("meshes.parts", np.zeros(0, np.int32), len(triangles))
     closed = snapshot.array("meshes.closed", np.zeros(0, np.bool_), len(triangles))
     check_range("meshes.of", of, 0, len(triangles))
-    for name, counts in (("meshes.triangles", triangles), ("meshes.parts", parts)):
-        check_range(name, counts, 1, 1 << 31)
+    tile_counts = snapshot.array("meshes.tile_counts", np.zeros(len(triangles), np.int32), len(triangles))
+    check_range("meshes.tile_counts", tile_counts, 0, 1 << 31)
+    tiles = snapshot.array("meshes.tiles", np.zeros(0, np.int32), int(tile_counts.sum()))
+    check_range("meshes.tiles", tiles, 1, 1 << 31)
+    of_mesh = np.split(tiles.astype(np.int64), np.cumsum(tile_counts)[:-1])
+    check_range("meshes.triangles", triangles, 1, 1 << 31)
+    check_range("meshes.parts", parts, 0, 1 << 31)
+    if any(len(own) and own.sum() != count for own, count in zip(of_mesh, triangles.tolist(), strict=True)):
+        raise InputError("snapshot, meshes.tiles: expected the triangles of each mesh, got other numbers")
+    if (parts[tile_counts == 0] < 1).any():
+        raise InputError("snapshot, meshes.parts: expected at least one of each mesh without tiles, got none")
     corners = snapshot.array("meshes.corners", np.zeros((0, 3, 3)), int(triangles.sum()))
     points = snapshot.array("meshes.points", np.zeros((0, 3)), int(parts.sum()))
     if not ((np.abs(corners) <= LARGEST_INPUT).all() and (np.abs(points) <= LARGEST_INPUT).all()):
@@ -101,7 +113,10 @@ def _plant_triangles(builder: ShapeTableBuilder, snapshot: Snapshot) -> None:
     ends, last = np.cumsum(triangles), np.cumsum(parts)
     trees = [
         TreeSurface(
-            corners[ends[k] - triangles[k] : ends[k]], bool(closed[k]), points[last[k] - parts[k] : last[k]]
+            corners[ends[k] - triangles[k] : ends[k]],
+            bool(closed[k]),
+            points[last[k] - parts[k] : last[k]],
+            of_mesh[k],
         ).tree
         for k in range(len(triangles))
     ]

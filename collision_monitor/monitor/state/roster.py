@@ -28,6 +28,7 @@ from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.objects.models import Modelled, monitored_model
 from collision_monitor.records import Model, ShapeType
 from collision_monitor.settings.by_name import Classes, value_of
+from collision_monitor.shapes.cells.tiled_solid import is_unsure
 from collision_monitor.shapes.kinds.polygon import POLYGON
 from collision_monitor.shapes.planar import flat_pose, is_planar
 from collision_monitor.shapes.pose import Pose
@@ -43,12 +44,12 @@ class Roster(Stage):
 
     bodies, parts: the arrays that the kernels read. top: number of slots that have been used so far. planar: the scene
     lies in the x-y plane. mesh_faces: of the convex meshes, which name their features. renewed: slots that the next
-    step predicts anew, for example after a new description.
+    step predicts anew, for example after a new description. unsure: slots of shapes that may not be there.
     """
 
     SAVED = (
         *("bodies", "parts", "top", "planar", "renewed"),
-        *("mesh_faces", "_shapes", "_slots", "_names", "_memory", "_free", "_allowed"),
+        *("mesh_faces", "unsure", "_shapes", "_slots", "_names", "_memory", "_free", "_allowed"),
     )
     CACHES = ("_last_ids", "_last_slots", "_allowed_keys", "_by_name")
 
@@ -59,6 +60,7 @@ class Roster(Stage):
         self.planar = False
         self.renewed: set[int] = set()
         self.mesh_faces = MeshFaces()
+        self.unsure: set[int] = set()
         self._shapes = ShapeTableBuilder()
         self._slots: dict[int, int] = {}
         self._names: dict[int, str] = {}
@@ -200,6 +202,8 @@ class Roster(Stage):
             faces = faces_of(d, modelled, k)
             if faces is not None:
                 self.mesh_faces.add(slot, faces)
+        pieces = (piece for piece, _ in modelled.pieces)
+        self.unsure.update(slot for slot, piece in zip(slots, pieces, strict=True) if is_unsure(piece))
         lay_out_body(self.multibody, i, slots, modelled.shapes)
         self.planar = planar
         self._write_body(i, d, pose, modelled)
@@ -301,6 +305,7 @@ class Roster(Stage):
         while slot >= 0:
             self._shapes.remove(slot)
             self.mesh_faces.drop(slot)
+            self.unsure.discard(slot)
             slot, self.parts.next[slot] = int(self.parts.next[slot]), -1
         self.bodies.first_shape[i] = -1
 
@@ -345,6 +350,7 @@ class Roster(Stage):
             "allowed": {str(object_id): sorted(others) for object_id, others in self._allowed.items()},
             "planar": self.planar,
             "renewed": sorted(self.renewed),
+            "unsure": sorted(self.unsure),
             "free": list(self._free),
             "free_shapes": free_shapes,
             "free_blocks": list(free_blocks.items()),
@@ -406,6 +412,7 @@ class Roster(Stage):
         self._shapes = ShapeTableBuilder.restored(table, list(facts["free_shapes"]), free_blocks)
         plant_meshes(self._shapes, snapshot)
         self.mesh_faces = MeshFaces.restored(snapshot, table.kind)
+        self.unsure = set(facts.get("unsure", ()))
 
 
 def _check_chains(bodies: BodyTable, parts: Parts, kind: NDArray[Any]) -> None:

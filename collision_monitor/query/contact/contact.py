@@ -187,9 +187,21 @@ def _completed(
     excess = a.excess + b.excess
     if distance <= 0.0 and excess > 0.0 and (a.stands_for_concave or b.stands_for_concave):
         bound -= distance  # the models may overlap deeply although the concave objects are apart
+    bound = max(bound, _certain_distance(a, pose_a, b, pose_b) - distance)
     found = Contact(distance, bound + excess, row, arguments)
     found.__dict__.update(model_a=a.model, model_b=b.model, _bodies=(a, b))
     return found
+
+
+def _certain_distance(a: QueryBody, pose_a: Pose, b: QueryBody, pose_b: Pose) -> float:
+    """Distance (m) of what is certainly there of two objects; -inf if that is all of them."""
+    sure_a, sure_b = a.certain, b.certain
+    if sure_a is a and sure_b is b:
+        return -inf
+    if sure_a is None or sure_b is None:
+        return inf
+    plant_bodies(sure_a, sure_b)
+    return contact_row(sure_a.slots.first, pose_a, sure_b.slots.first, pose_b, SOLIDS)[0]
 
 
 def plant_bodies(a: QueryBody, b: QueryBody) -> None:

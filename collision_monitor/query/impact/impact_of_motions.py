@@ -46,7 +46,17 @@ def impact_of_motions(a: MovingBody, b: MovingBody, query: MotionQuery) -> tuple
     lower, upper, method = _impact_of_surfaces(a, b, query)
     if lower > 0.0 and not a.body.inside == b.body.inside == CERTAIN:
         lower = min(lower, _first_possible_impact(a, b, query))
+    if not (a.body.certain is a.body and b.body.certain is b.body):
+        upper = _certain_impact(a, b, query)
     return lower, upper if upper <= query.horizon else inf, method
+
+
+def _certain_impact(a: MovingBody, b: MovingBody, query: MotionQuery) -> float:
+    """Latest time (s) of an impact of what is certainly there of two objects; infinite for none."""
+    if a.body.certain is None or b.body.certain is None:
+        return inf
+    sure = a._replace(body=a.body.certain), b._replace(body=b.body.certain)
+    return impact_of_motions(*sure, query)[1]
 
 
 def _impact_of_surfaces(a: MovingBody, b: MovingBody, query: MotionQuery) -> tuple[float, float, Method]:

@@ -91,7 +91,7 @@ def _impact_from_piece(pair: PlannedPair, query: MotionQuery, k: int) -> tuple[f
     """Lower and upper (s) of the first impact from the begin of piece k on; infinite for none."""
     earliest = inf
     chains, borders = (pair.a.slots.first, pair.b.slots.first), pair.pieces.borders
-    is_certain = pair.a.inside == pair.b.inside == CERTAIN
+    is_certain = pair.a.inside == pair.b.inside == CERTAIN and all(side.certain is side for side in pair[:2])
     lower, upper, code = inf, inf, TOUCHES
     while k < len(borders) - 1:
         if is_certain:

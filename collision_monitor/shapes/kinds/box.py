@@ -155,7 +155,7 @@ KIND: Final = Kind(
     shape=Box,
     dimensions="x, y, z",
     fields=lambda shape: Fields(tuple(shape.size)),
-    make=lambda dimensions, vertices, triangles: Box(dimensions),
+    make=lambda fields: Box(fields.dimensions),
     row=_row,
     support=lambda shape, d: np.asarray(np.abs(d) @ (np.array(shape.size) / 2)),
     contains=lambda shape, p: np.asarray((np.abs(p) <= np.array(shape.size) / 2).all(axis=1)),

@@ -129,7 +129,7 @@ KIND: Final = Kind(
     shape=Ellipsoid,
     dimensions="rx, ry, rz",
     fields=lambda shape: Fields(tuple(shape.radii)),
-    make=lambda dimensions, vertices, triangles: Ellipsoid(dimensions),
+    make=lambda fields: Ellipsoid(fields.dimensions),
     row=_row,
     support=lambda shape, d: np.asarray(np.linalg.norm(d * shape.radii, axis=-1)),
     contains=_contains,

@@ -7,7 +7,6 @@ from math import inf
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from collision_monitor.checks.numbers import real_array, real_number
 from collision_monitor.errors import ShapeError
@@ -54,8 +53,8 @@ class HalfSpace(Shape):
         object.__setattr__(self, "offset", offset)
 
 
-def _make(dimensions: list[float], vertices: Array, triangles: NDArray[Any]) -> HalfSpace:
-    return HalfSpace(dimensions[:3], dimensions[3])
+def _make(fields: Fields) -> HalfSpace:
+    return HalfSpace(fields.dimensions[:3], fields.dimensions[3])
 
 
 def _support(shape: HalfSpace, d: Array) -> Array:

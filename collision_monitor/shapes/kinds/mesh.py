@@ -7,7 +7,6 @@ from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from collision_monitor.checks.numbers import hides_some
 from collision_monitor.errors import ShapeError, UnsupportedError
@@ -92,10 +91,10 @@ def _first_hits(shape: Mesh, p: Array, d: Array) -> tuple[Array, Array]:
     return from_outside(within, best, normal)
 
 
-def _make(dimensions: list[float], vertices: Array, triangles: NDArray[Any]) -> Mesh:
-    if len(triangles) % 3:
-        raise ShapeError(f"Mesh triangles: expected three indices for each face, got {len(triangles)} indices")
-    return Mesh(vertices, triangles.astype(np.int64).reshape(-1, 3))
+def _make(fields: Fields) -> Mesh:
+    if len(fields.triangles) % 3:
+        raise ShapeError(f"Mesh triangles: expected three indices for each face, got {len(fields.triangles)} indices")
+    return Mesh(fields.vertices, fields.triangles.astype(np.int64).reshape(-1, 3))
 
 
 def _mass(shape: Mesh, density: float) -> MassProperties | None:

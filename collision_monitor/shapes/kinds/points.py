@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from collision_monitor.errors import ShapeError, UnsupportedError
 from collision_monitor.geometry.contact_features import Feature, FeatureType
@@ -71,10 +70,10 @@ def _first_hits(shape: Points, p: Array, d: Array) -> tuple[Array, Array]:
     return from_outside(best == 0.0, best, normal)
 
 
-def _make(dimensions: list[float], vertices: Array, triangles: NDArray[Any]) -> Points:
-    if len(dimensions) != 1:
-        raise ShapeError(f"Points: expected 1 dimension (radius), got {len(dimensions)}")
-    return Points(vertices, float(dimensions[0]))
+def _make(fields: Fields) -> Points:
+    if len(fields.dimensions) != 1:
+        raise ShapeError(f"Points: expected 1 dimension (radius), got {len(fields.dimensions)}")
+    return Points(fields.vertices, float(fields.dimensions[0]))
 
 
 def _feature(shape: Points, point: Array, normal: Array, tie: float, off: float) -> Feature:

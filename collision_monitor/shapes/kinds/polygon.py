@@ -63,10 +63,10 @@ def _row(shape: Polygon, _: Corners | None) -> Row:
     return Row(POLYGON, (len(ring),), radius, shape.radius, np.pad(shape.points, ((0, 0), (0, 1))), ring)
 
 
-def _make(dimensions: list[float], vertices: Array, triangles: NDArray[Any]) -> Polygon:
-    if len(dimensions) > 1:
-        raise ShapeError(f"Polygon: expected no dimensions, or 1 (radius), got {len(dimensions)}")
-    return Polygon(vertices[:, :2], *dimensions)
+def _make(fields: Fields) -> Polygon:
+    if len(fields.dimensions) > 1:
+        raise ShapeError(f"Polygon: expected no dimensions, or 1 (radius), got {len(fields.dimensions)}")
+    return Polygon(fields.vertices[:, :2], *fields.dimensions)
 
 
 def _fields(shape: Polygon) -> Fields:

@@ -8,7 +8,6 @@ from math import pi
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from collision_monitor.errors import ShapeError
 from collision_monitor.geometry.contact_features import Feature
@@ -112,8 +111,8 @@ def _feature(shape: RoundedBox, point: Array, normal: Array, tie: float, off: fl
     return feature_of_box(2.0 * shape.core, point - shape.radius * normal, normal, tie, off)
 
 
-def _make(dimensions: list[float], vertices: Array, triangles: NDArray[Any]) -> RoundedBox:
-    return RoundedBox(dimensions[:3], dimensions[3])
+def _make(fields: Fields) -> RoundedBox:
+    return RoundedBox(fields.dimensions[:3], fields.dimensions[3])
 
 
 KIND: Final = Kind(

@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.objects.description import ObjectDescription
+from collision_monitor.shapes.kinds.grid import UNKNOWN_IS
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import Shape
 from collision_monitor.sources.ground.motion_models import AS_USUAL, MotionChoice, read_motion
@@ -30,10 +31,18 @@ NUMBERS: Final = {
     "min_range": ("m", 0.0),
     "max_range": ("m", 1e9),
     "clearance": ("m", 0.0),
+    "threshold": ("value", 0.0),
+    "min_height": ("m", 0.0),
+    "max_height": ("m", 1e9),
+    "ground_slope": ("deg", 0.0),
+    "ground_thickness": ("m", 0.1),
 }
 """Keys with a number, their units and defaults."""
 
-KEYS: Final = (*PLACE, *BODY, "covariance", "without", "nan_is_free", "motion", "acceleration", "paths", *NUMBERS)
+KEYS: Final = (
+    *(*PLACE, *BODY, "covariance", "without", "nan_is_free", "motion", "acceleration", "paths"),
+    *("unknown", "updates", "voxels", "layer", *NUMBERS),
+)
 
 
 @dataclass(frozen=True)
@@ -45,8 +54,10 @@ class ObjectEntry:
     group, in place of those in the messages. pose: of a static object, in `frame` (empty: the
     monitor's). covariance: whether covariances in the messages are used. without: names of the objects
     whose points a scan leaves out. nan_is_free: whether its NaN mean that nothing is there. motion: how the objects
-    move on from their states. schedule: where the object is when, declared. paths: which predicted paths count. given:
-    the keys that the file holds. The numbers are those of NUMBERS.
+    move on from their states. schedule: where the object is when, declared. paths: which predicted paths count.
+    unknown: what unknown cells of a map are (UNKNOWN_IS). updates: the topic of its updates, or empty. voxels: whether
+    a cloud is cells of the edge `voxel`. layer: of the heights of a GridMap. given: the keys that the file holds. The
+    numbers are those of NUMBERS.
     """
 
     name: str
@@ -77,6 +88,15 @@ class ObjectEntry:
     min_range: float = 0.0
     max_range: float = 1e9
     clearance: float = 0.0
+    threshold: float = 0.0
+    unknown: str = UNKNOWN_IS[0]
+    updates: str = ""
+    voxels: bool = False
+    layer: str = "elevation"
+    min_height: float = 0.0
+    max_height: float = 1e9
+    ground_slope: float = 0.0
+    ground_thickness: float = 0.1
     without: tuple[str, ...] = ()
     nan_is_free: bool = False
     motion: MotionChoice = AS_USUAL
@@ -169,6 +189,8 @@ def _entry(name: str, content: dict[str, Any], object_id: int) -> ObjectEntry:
     for key, names in (("allowed", allowed), ("without", without)):
         if not isinstance(names, list):
             raise InputError(f"{name}, {key}: expected a list of names, got {names!r}")
+    unknown = text(content.get("unknown", UNKNOWN_IS[0]), f"{name}, unknown")
+    known(unknown, UNKNOWN_IS, f"{name}, unknown")
     values: dict[str, Any] = {
         key: number(content.get(key, default), f"{name}, {key}", unit) for key, (unit, default) in NUMBERS.items()
     }
@@ -193,6 +215,10 @@ def _entry(name: str, content: dict[str, Any], object_id: int) -> ObjectEntry:
         motion=read_motion(content, name),
         paths=text(content.get("paths", "all"), f"{name}, paths"),
         schedule=read_schedule(content["schedule"], name) if "schedule" in content else None,
+        unknown=unknown,
+        updates=text(content.get("updates", ""), f"{name}, updates"),
+        voxels=truth(content.get("voxels", False), f"{name}, voxels"),
+        layer=text(content.get("layer", "elevation"), f"{name}, layer"),
         given=tuple(content),
         **values,
     )

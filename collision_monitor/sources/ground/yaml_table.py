@@ -9,15 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.checks.numbers import as_numbers, checked_yaml_number
-from collision_monitor.codec.shape_fields import make_shape
+from collision_monitor.codec.shape_fields import RawShape, make_shape
 from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.records import ShapeType
 from collision_monitor.settings.names import nearest_name
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.registry import Shape
+from collision_monitor.shapes.registry import KINDS, Mesh, Shape
 
 BY_VERTICES = ("convex_hull", "polygon")
-SHAPES = tuple(kind.name.lower() for kind in ShapeType if kind not in (ShapeType.MESH, ShapeType.POINTS))
+SHAPES = tuple(
+    kind.name.lower() for kind in ShapeType if kind != ShapeType.POINTS and not issubclass(KINDS[kind - 1].shape, Mesh)
+)
 
 
 def table(value: Any, what: str, keys: Collection[str]) -> dict[str, Any]:
@@ -90,7 +92,7 @@ def shape(value: Any, name: str) -> tuple[Shape, Pose]:
     none = np.zeros(0)
     dimensions, vertices = (none, given) if by_vertices else (np.atleast_1d(given), none)
     try:
-        made = make_shape(ShapeType[kind.upper()], dimensions, vertices, np.zeros(0, np.uint32))
+        made = make_shape(RawShape(ShapeType[kind.upper()], dimensions, vertices))
     except CollisionMonitorError as error:
         raise InputError(f"{name}, shape: {error}") from None
     return made, pose(content["at"], f"{name}, at") if "at" in content else Pose()

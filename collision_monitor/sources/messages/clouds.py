@@ -15,14 +15,15 @@ from numpy.typing import NDArray
 from collision_monitor.errors import InputError
 from collision_monitor.query.points.points_within import points_within
 from collision_monitor.shapes.kinds.points import MOST_CLOUD_POINTS
-from collision_monitor.shapes.pose import Pose
-from collision_monitor.shapes.registry import Points, Sphere
+from collision_monitor.shapes.pose import Pose, rotation_matrix
+from collision_monitor.shapes.registry import Points, Sphere, Voxels
 from collision_monitor.sources.ground.frames import FrameMotion, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.ground.yaml_table import known
+from collision_monitor.sources.messages.ground_points import above_ground
 from collision_monitor.sources.messages.laser_scans import MOST_HELD, SCAN, BeamMemory, read_beams
 from collision_monitor.tolerances import LARGEST_INPUT
 
@@ -35,20 +36,27 @@ Floats = NDArray[np.float64]
 MOST_POINTS: Final = 4 * MOST_CLOUD_POINTS
 """Points of a message, before those without a place are dropped and the others are thinned."""
 
+KEYS: Final = "radius", "voxel", "min_range", "max_range", "without", "clearance", "nan_is_free"
+GROUND_KEYS: Final = "voxels", "frame", "min_height", "max_height", "ground_slope", "ground_thickness"
+"""Keys of an entry, and further ones of a PointCloud2."""
+
 _FORMATS: Final = {7: ("f4", 4), 8: ("f8", 8)}
 """NumPy's names of PointField's float types, and their bytes."""
 
 
 class CloudSource(Source):
-    """The scan of one entry: points of the entry's `radius`, thinned to one for each cube of its `voxel`.
+    """The scan of one entry: points of the entry's `radius`, thinned to one for each cube of its `voxel`, or `voxels`.
 
     Points on the objects that `without` names are left out: those of the robot that carries the sensor. A scan that
     measured nothing is refused, and what the last one saw stays: a failed sensor does not make free space.
     """
 
     def __init__(self, entry: ObjectEntry, message_type: str, mapping: Mapping) -> None:
-        keys = "radius", "voxel", "min_range", "max_range", "without", "clearance", "nan_is_free"
-        entry.allow_only(keys, message_type)
+        entry.allow_only((*KEYS, *(GROUND_KEYS if message_type == CLOUD else ())), message_type)
+        if entry.voxels and not entry.voxel:
+            raise InputError(f"{entry.name}, voxel: expected the edge of the voxels in m, got none")
+        if not entry.ground_slope < 90.0:
+            raise InputError(f"{entry.name}, ground_slope: expected less than 90 deg, got {entry.ground_slope:g}")
         if entry.shapes:
             raise InputError(f"{entry.name}, shape: {message_type} brings its own points; `radius` is theirs")
         for each in entry.without:
@@ -67,7 +75,12 @@ class CloudSource(Source):
             return
         points, lost = self._cloud(content) if hasattr(content, "point_step") else self._scan(content, frame, scene)
         scene.points_dropped[entry.name] += lost
-        points, radius = thinned(points, entry.voxel, entry.radius)
+        points = self._without_ground(points, frame, stamp_ns, scene)
+        cells = _cells(points, entry.voxel) if entry.voxels else None
+        if cells is None:
+            points, radius = thinned(points, entry.voxel, entry.radius)
+        else:
+            points, radius = entry.voxel * (cells.astype(np.float64) + 0.5), 0.5 * math.sqrt(3.0) * entry.voxel
         if not len(points):  # nothing is there, as far as the scan says
             scene.remove(entry.object_id)
             return
@@ -78,7 +91,8 @@ class CloudSource(Source):
             return
         if not kept.all():
             cloud = Points(points[kept], radius)
-        scene.describe(entry.describe(shapes=((cloud, Pose()),), at=at))
+        shape = cloud if cells is None else Voxels(cells[kept], entry.voxel)
+        scene.describe(entry.describe(shapes=((shape, Pose()),), at=at))
 
     def restart(self, now_ns: int, scene: SourceScene) -> None:
         """See Source. The scanner may be elsewhere now, and what it saw not be there."""
@@ -106,6 +120,20 @@ class CloudSource(Source):
             raise InputError(f"points: expected {expected}, got none of {len(points) + lost}; what was there stays")
         return points[self._within(points)], lost
 
+    def _without_ground(self, points: Floats, frame: FrameMotion, stamp_ns: int, scene: SourceScene) -> Floats:
+        """The points that are no ground, by their heights in the entry's frame. Raises InputError if tf lacks it."""
+        entry = self._entry
+        if not (entry.ground_slope or {"min_height", "max_height"} & set(entry.given)):
+            return points
+        placed = points @ rotation_matrix(frame.quaternion).T + frame.position
+        if entry.frame and entry.frame != scene.frame:
+            level = scene.frames.motion(scene.frame, entry.frame, stamp_ns)
+            if not isinstance(level, FrameMotion):
+                raise InputError(f"frame: {level}; what was there stays")
+            placed = (placed - level.position) @ rotation_matrix(level.quaternion)
+        low = entry.min_height if "min_height" in entry.given else -LARGEST_INPUT
+        return points[above_ground(placed, (low, entry.max_height), entry.ground_slope, entry.ground_thickness)]
+
     def _within(self, points: Floats) -> NDArray[np.bool_]:
         """Which points (N,) are within the entry's range of the sensor."""
         squared = _squared(points)
@@ -122,6 +150,14 @@ class CloudSource(Source):
                 limit = self._entry.clearance + description.padding
                 on |= points_within(cloud, at, description.shapes, pose, limit)
         return on
+
+
+def _cells(points: Floats, edge: float) -> NDArray[np.int32]:
+    """The cells (n, 3) of an edge (m) that hold points (N, 3), of a lattice at the origin. Raises InputError."""
+    cells = np.floor(points / edge)
+    if not (np.abs(cells) < 1 << 30).all():
+        raise InputError(f"voxel: expected cells whose numbers are below 2^30, got smaller cells of {edge:g} m")
+    return np.unique(cells.astype(np.int32), axis=0)
 
 
 def read_cloud_points(cloud: Any) -> tuple[Floats, int]:

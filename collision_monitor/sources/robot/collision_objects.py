@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
-from functools import cache, cached_property
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Final
 
 import numpy as np
@@ -49,18 +49,11 @@ def shape_digest(shapes: Parts) -> bytes:
     """Return what is equal for equal shapes at equal poses."""
     digest = hashlib.blake2b(digest_size=16)
     for shape, at in shapes:
-        kind: Any = type(shape)
-        digest.update(kind.__name__.encode())
-        for name in _names_of(kind):
-            digest.update(np.ascontiguousarray(getattr(shape, name)).tobytes())
+        digest.update(type(shape).__name__.encode())
+        for value in shape.__getstate__().values():
+            digest.update(np.ascontiguousarray(value).tobytes())
         digest.update(at.position.tobytes() + at.quaternion.tobytes())
     return digest.digest()
-
-
-@cache
-def _names_of(kind: type[Shape]) -> tuple[str, ...]:
-    """Return the names of the fields of a kind of shape."""
-    return tuple(field.name for field in fields(kind))
 
 
 def pose_bytes(pose: Pose) -> tuple[bytes, bytes]:
@@ -92,9 +85,9 @@ def collision_object(message: Any, before: CollisionObject | None = None) -> Col
         moved = [*message.primitive_poses, *message.mesh_poses, *message.plane_poses]
         if moved and len(moved) != len(before.shapes):
             raise InputError(f"expected poses of {len(before.shapes)} shapes, got {len(moved)}")
-        places = map(_pose, moved) if moved else (place for _, place in before.shapes)
+        places = map(message_pose, moved) if moved else (place for _, place in before.shapes)
         shapes = tuple((shape, place) for (shape, _), place in zip(before.shapes, places, strict=True))
-        return CollisionObject(before.name, shapes, _frame(message), _pose(message.pose))
+        return CollisionObject(before.name, shapes, _frame(message), message_pose(message.pose))
     shapes = _solids(message)
     if not shapes:
         raise InputError("expected at least one shape, got none")
@@ -104,7 +97,7 @@ def collision_object(message: Any, before: CollisionObject | None = None) -> Col
         return CollisionObject(before.name, (*before.shapes, *shapes), before.frame, before.pose)
     if len(message.id) > LONGEST_KEY:
         raise InputError(f"id: expected at most {LONGEST_KEY} characters, got {len(message.id)}")
-    return CollisionObject(str(message.id), shapes, _frame(message), _pose(message.pose))
+    return CollisionObject(str(message.id), shapes, _frame(message), message_pose(message.pose))
 
 
 def _frame(message: Any) -> str:
@@ -152,11 +145,11 @@ def _shapes(message: Any) -> Iterator[tuple[Shape, Pose]]:
         if len(poses) > len(solids):
             raise InputError(f"expected a pose of each of {len(solids)} shapes, got {len(poses)}")
         for k, solid in enumerate(solids):
-            place = _pose(poses[k]) if k < len(poses) else Pose()  # as in MoveIt
+            place = message_pose(poses[k]) if k < len(poses) else Pose()  # as in MoveIt
             yield from ((shape, place) for shape in make(solid))
 
 
-def _pose(message: Any) -> Pose:
+def message_pose(message: Any) -> Pose:
     """Return the pose of a geometry_msgs/Pose. As in MoveIt, a quaternion of zeros is none, and others have no length.
 
     Source: MoveIt, planning_scene.cpp, poseMsgToEigen.

@@ -1,7 +1,7 @@
 """MoveIt's planning scene as a source: static objects of the world, objects that a robot holds, rules for its links.
 
 The world has no speeds, so its objects are static. Only changes are described again: a scene that repeats itself costs
-nothing in the monitor. Octomaps and fixed_frame_transforms are not read.
+nothing in the monitor. Its octomap is one more object. fixed_frame_transforms are not read.
 """
 
 from __future__ import annotations
@@ -14,11 +14,13 @@ from collision_monitor.errors import CollisionMonitorError, InputError
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.robots.urdf import LONGEST_LINK_NAME, MOST_LINKS
 from collision_monitor.shapes.pose import Pose
-from collision_monitor.sources.ground.frames import MissingFrame
+from collision_monitor.sources.ground.frames import MissingFrame, frame_name
 from collision_monitor.sources.ground.mapping import Mapping as SourcesFile
 from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import LONGEST_TEXT, SourceScene
+from collision_monitor.sources.messages.octomap_leaves import octomap_voxels
+from collision_monitor.sources.messages.octomaps import OCCUPIED
 from collision_monitor.sources.robot.carried_bodies import Body
 from collision_monitor.sources.robot.collision_objects import (
     APPEND,
@@ -27,6 +29,7 @@ from collision_monitor.sources.robot.collision_objects import (
     Parts,
     collision_object,
     has_pose,
+    message_pose,
     operation_of,
 )
 from collision_monitor.sources.robot.link_rules import LinkRules
@@ -35,6 +38,9 @@ from collision_monitor.sources.robot.robot_source import RobotSource
 
 PLANNING_SCENE: Final = "moveit_msgs/msg/PlanningScene"
 COLLISION_OBJECT: Final = "moveit_msgs/msg/CollisionObject"
+
+OCTOMAP_NAME: Final = "<octomap>"
+"""Name of the octomap among the objects of the world, as in MoveIt, also in the matrix of allowed collisions."""
 
 MOST_OBJECTS: Final = 10_000
 """Objects of a planning scene."""
@@ -118,6 +124,7 @@ class PlanningSceneSource(Source):
         """Take a PlanningScene: first what is attached, which may come from the world as it was, then the world."""
         objects = content.world.collision_objects
         named = {str(each.id) for each in objects}
+        named |= {OCTOMAP_NAME} if len(content.world.octomap.octomap.data) else set()
         if not content.is_diff:
             for name in sorted(self._unusable - named - {str(each.object.id) for each in _attached(content)}):
                 self._unusable.remove(name)
@@ -132,7 +139,7 @@ class PlanningSceneSource(Source):
         self._is_changed |= self._rules.take(content, scene)
         for each in objects:
             self._change_world(each, scene)
-        self._note_octomap(content, scene)
+        self._take_octomap(content.world.octomap, scene)
 
     def _take_attached(self, content: Any, stamp_ns: int, scene: SourceScene, stays: Iterable[str]) -> None:
         attached = _attached(content)
@@ -150,14 +157,25 @@ class PlanningSceneSource(Source):
             if name not in self._held and name not in self._world:
                 self._lack(name, scene)
 
-    def _note_octomap(self, content: Any, scene: SourceScene) -> None:
-        what = f"{self.name}: octomap"
-        if len(content.world.octomap.octomap.data):
-            text = "the octomap of the planning scene is not monitored; give its points as a topic"
-            scene.refuse(self.name, text)
-            scene.lacks(self.name, what, text)
-        elif not content.is_diff:
-            scene.has(self.name, what)
+    def _take_octomap(self, given: Any, scene: SourceScene) -> None:
+        """Take an OctomapWithPose as an object of the world. An empty one says nothing."""
+        if not len(given.octomap.data):
+            return
+        known = self._world.get(OCTOMAP_NAME)
+        with scene.guard(self.name, OCTOMAP_NAME):
+            voxels = octomap_voxels(given.octomap, OCCUPIED)
+            if voxels is None:
+                self._drop(OCTOMAP_NAME, scene)
+                return
+            frame = frame_name(given.header.frame_id or given.octomap.header.frame_id)
+            content = CollisionObject(OCTOMAP_NAME, ((voxels, Pose()),), frame, message_pose(given.origin))
+            if known is None or known.content.fingerprint != content.fingerprint:
+                object_id = known.object_id if known is not None else self._id(OCTOMAP_NAME, None, scene)
+                self._world[OCTOMAP_NAME] = WorldObject(object_id, content)
+                self._is_changed = True
+            return
+        if known is None:
+            self._lack(OCTOMAP_NAME, scene)
 
     def _change_world(self, message: Any, scene: SourceScene) -> None:
         name = str(message.id)

@@ -200,10 +200,29 @@ def test_the_allowed_collision_matrix_adds_pairs_and_takes_those_of_the_srdf_bac
     assert ("hand", "wall") not in allowed_pairs(played)
 
 
-def test_octomaps_and_unknown_links_are_refused() -> None:
+def test_an_octomap_is_an_object_of_the_world() -> None:
+    played = with_world()
+    content = a_scene()
+    octomap = content.world.octomap
+    octomap.header.frame_id, octomap.octomap.binary, octomap.octomap.resolution = "map", True, 0.1
+    octomap.octomap.data = np.frombuffer(b"\x03\x00" * 15 + b"\x02\x00", np.int8)  # its lowest cell
+    octomap.origin.position.z = 3276.8
+    played.send("/scene", SCENE, content)
+    found = played.objects["world/<octomap>"]
+    assert found.static and found.shapes[0][0].cells.tolist() == [[-32768] * 3]
+    assert found.pose is not None and found.pose.position.tolist() == [0, 0, 3276.8]
+    count = played.messages
+    played.send("/scene", SCENE, content)  # the same again, then a difference without an octomap
+    played.send("/scene", SCENE, a_scene())
+    assert played.messages == count and "world/<octomap>" in played.objects
+    played.send("/scene", SCENE, a_scene(is_diff=False))
+    assert not played.objects and not played.refusals
+
+
+def test_damaged_octomaps_and_unknown_links_are_refused() -> None:
     played, _ = ready()
     content = a_scene(held=[attached("tail", an_object("cup", solid(2, 0.1), frame="tail"))])
     content.world.octomap.octomap.data = np.zeros(3, np.int8)
     played.send("/scene", SCENE, content)
-    assert any("octomap of the planning scene is not monitored" in text for text in played.refusals)
+    assert any("arm: <octomap>: id: expected OcTree" in text for text in played.refusals)
     assert any("arm: cup: expected it at a link of arm, got 'tail'" in text for text in played.refusals)
