@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from collision_monitor.codec.trajectories import Between, ObjectTrajectory, Then
 from collision_monitor.motion.stated_motion import set_courses, straight_motions
 from collision_monitor.motion.trajectory import FASTEST
+from collision_monitor.robots.constant_rates import constant_rates
 from collision_monitor.robots.kinematic_tree import KinematicTree, with_fixed_rows
 from collision_monitor.robots.link_pieces import Wanted
 from collision_monitor.robots.link_plans import TUBE, link_plans, radius_of
@@ -91,7 +92,7 @@ class RobotPlans:
         wanted = Wanted(self._wanted.rows[which], self._wanted.radii[which])
         row = straight_motions(base[None])
         set_courses(row, False, True, False)
-        plans = link_plans(self._tree, wanted, joints, row[0], LONGER * horizon)
+        plans = link_plans(self._tree, wanted, constant_rates(self._tree, joints, LONGER * horizon), row[0])
         found, has_plan = [], np.zeros_like(usable)
         for b, (k, tube) in enumerate(zip(which.tolist(), plans.pieces.tubes.tolist(), strict=True)):
             if plans.pieces.counts[b] > 2 and tube <= LARGEST_INPUT:
