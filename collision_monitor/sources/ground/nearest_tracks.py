@@ -46,9 +46,7 @@ def assigned(detections: Floats, tracks: Floats, gate: float) -> tuple[Rows, Row
     return i, j
 
 
-def _assigned_block(
-    detections: Floats, tracks: Floats, rows: Rows, columns: Rows, gate: float
-) -> tuple[Rows, Rows]:
+def _assigned_block(detections: Floats, tracks: Floats, rows: Rows, columns: Rows, gate: float) -> tuple[Rows, Rows]:
     from scipy.optimize import linear_sum_assignment
     from scipy.spatial.distance import cdist
 

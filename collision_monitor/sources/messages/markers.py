@@ -88,7 +88,7 @@ class MarkerSource(Source):
         if self._waiting and scene.may_describe:
             by_message: dict[tuple[int, int], list[int]] = {}
             contents = {}
-            for number in list(self._waiting)[: MARKERS_AT_ONCE]:
+            for number in list(self._waiting)[:MARKERS_AT_ONCE]:
                 content, row, stamp = self._waiting.pop(number)
                 contents[id(content)] = content
                 by_message.setdefault((id(content), stamp), []).append(row)

@@ -77,9 +77,7 @@ class PoseSource(Source):
             given = None
         if frame is not IDENTITY:
             given = carry_states(states, frame, given)
-        scene.observe(
-            entry.name, states, stamp_ns, given, window=entry.estimate_over, turns=twist is not None
-        )
+        scene.observe(entry.name, states, stamp_ns, given, window=entry.estimate_over, turns=twist is not None)
 
     def _blocks(self, part: Any, what: str, scene: SourceScene) -> Blocks:
         found = usable_blocks(np.asarray(part.covariance, np.float64).reshape(1, 36))
