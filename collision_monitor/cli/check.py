@@ -99,9 +99,7 @@ def check_command(args: argparse.Namespace) -> int:
         expectations = read_expectations(args.expect)
     rules = None if args.rules is None else given_rules(args.rules)
     paths = find_sessions(args.sessions)
-    check_outputs(
-        {"--junit": args.junit}, force=args.force, inputs=[*paths, args.expect, args.rules, args.replay]
-    )
+    check_outputs({"--junit": args.junit}, force=args.force, inputs=[*paths, args.expect, args.rules, args.replay])
     results = []
     with progress_bar("check", len(paths)) as done:
         for each in check_sessions(paths, expectations, with_profile=args.replay, rules=rules, engine=engine):

@@ -111,13 +111,15 @@ def support_bounds(n: Vector, u: Vector, gaps: Any, blocks: Any, block: int, out
 
 # the directions as vectors, 8 after 8: 12 sums of two axes, 4 unused, 8 sums of three axes
 _SIGNS: Final = [1.0, -1.0]
-_DIRECTIONS: Final = np.array([
-    *((s, t, 0.0) for s in _SIGNS for t in _SIGNS),
-    *((s, 0.0, t) for s in _SIGNS for t in _SIGNS),
-    *((0.0, s, t) for s in _SIGNS for t in _SIGNS),
-    *((0.0, 0.0, 0.0) for _ in range(4)),
-    *((s, t, u) for s in _SIGNS for t in _SIGNS for u in _SIGNS),
-])
+_DIRECTIONS: Final = np.array(
+    [
+        *((s, t, 0.0) for s in _SIGNS for t in _SIGNS),
+        *((s, 0.0, t) for s in _SIGNS for t in _SIGNS),
+        *((0.0, s, t) for s in _SIGNS for t in _SIGNS),
+        *((0.0, 0.0, 0.0) for _ in range(4)),
+        *((s, t, u) for s in _SIGNS for t in _SIGNS for u in _SIGNS),
+    ]
+)
 
 REACHES: Final = len(_DIRECTIONS)
 """Numbers of `extend`."""

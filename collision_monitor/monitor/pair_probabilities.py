@@ -34,6 +34,7 @@ FINEST_WITH_PLANES: Final = 1e-5
 FEWEST_SAMPLES: Final = 16
 """Fewest samples of a pair that has only a part of `uncertainty_samples`."""
 
+
 class Workspaces(NamedTuple):
     """Scratch memory of one thread."""
 

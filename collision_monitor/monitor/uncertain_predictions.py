@@ -384,9 +384,7 @@ def _sorted(predictions: Records) -> Records:
     return predictions[np.lexsort((predictions["id_b"], predictions["id_a"], predictions["lower"]))]
 
 
-def _possible(
-    step: StepContext, keys: NDArray[np.uint64], slots: Pairs, answers: NDArray[np.float64]
-) -> Records:
+def _possible(step: StepContext, keys: NDArray[np.uint64], slots: Pairs, answers: NDArray[np.float64]) -> Records:
     """Build the predictions (records.PREDICTION) of pairs that may meet though they are stated to pass."""
     bodies = step.roster.bodies
     rows = np.zeros(len(keys), PREDICTION)

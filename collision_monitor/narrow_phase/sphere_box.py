@@ -96,6 +96,4 @@ def sphere_box_contact(radius: float, half: Vector, margin: float, R: Any, p: Ve
             out[FEATURE_INDEX_B] = 8.0 + (1.0 if qx > 0.0 else 0.0) + (2.0 if qy > 0.0 else 0.0)
     else:
         out[FEATURE_TYPE_B] = VERTEX
-        out[FEATURE_INDEX_B] = (
-            (1.0 if qx > 0.0 else 0.0) + (2.0 if qy > 0.0 else 0.0) + (4.0 if qz > 0.0 else 0.0)
-        )
+        out[FEATURE_INDEX_B] = (1.0 if qx > 0.0 else 0.0) + (2.0 if qy > 0.0 else 0.0) + (4.0 if qz > 0.0 else 0.0)

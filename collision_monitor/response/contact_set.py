@@ -69,9 +69,7 @@ class Contacts(NamedTuple):
 
     def check(self, bodies: int) -> None:
         """Raise InputError for an index beyond the number of bodies."""
-        if len(self.a) and not (
-            min(self.a.min(), self.b.min()) >= 0 and max(self.a.max(), self.b.max()) < bodies
-        ):
+        if len(self.a) and not (min(self.a.min(), self.b.min()) >= 0 and max(self.a.max(), self.b.max()) < bodies):
             raise InputError(f"pairs: expected indices from 0 to {bodies - 1}, got others")
 
     def closing(self, bodies: Bodies) -> Array:

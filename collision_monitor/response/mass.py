@@ -20,7 +20,5 @@ def mass_properties(shape: Shape, density: float = 1000.0) -> MassProperties:
     found = None if mass is None else mass(shape, density)
     if found is None:
         solids = ", ".join(kind.shape.__name__ for kind in KINDS if kind.mass is not None)
-        raise UnsupportedError(
-            f"{type(shape).__name__} has no mass properties; supported are {solids}, with a volume"
-        )
+        raise UnsupportedError(f"{type(shape).__name__} has no mass properties; supported are {solids}, with a volume")
     return found

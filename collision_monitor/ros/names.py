@@ -15,9 +15,7 @@ def check_node_name(name: str) -> None:
     try:
         validate_full_topic_name(Topic.STATUS.of(name))
     except InvalidTopicNameException:
-        raise InputError(
-            f"monitor: expected a node's name of letters, digits and underscores, got {name!r}"
-        ) from None
+        raise InputError(f"monitor: expected a node's name of letters, digits and underscores, got {name!r}") from None
 
 
 def is_topic_name(name: str) -> bool:

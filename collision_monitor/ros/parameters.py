@@ -84,6 +84,7 @@ DEFAULT_FRAME = "world"
 EXECUTORS = ("single", "events")
 RECORD_MODES = ("always", "on_event")
 
+
 @dataclass(frozen=True)
 class MonitorParameters:
     """The checked parameters of the monitor."""

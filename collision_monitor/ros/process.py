@@ -43,6 +43,7 @@ FAILURE_PERIOD: Final = 10.0
 MOST_FAILURES: Final = 100
 """Different errors whose last lines are remembered."""
 
+
 class StopRequest:
     """Set by SIGINT or SIGTERM. Further signals during the shutdown change nothing.
 

@@ -65,8 +65,6 @@ class Moment:
         return self.bodies.descriptions[at].name if known else f"object_{object_id}"
 
     def poses_at(self, rows: Indices, after: Floats) -> tuple[Floats, Floats]:
-        """Return positions (k, 3) and quaternions (k, 4) `after` (k,) s from the step, as the last states move.
-
-        """
+        """Return positions (k, 3) and quaternions (k, 4) `after` (k,) s from the step, as the last states move."""
         moved = moved_states(self.state[rows], after + self.age[rows])
         return moved["position"], moved["quaternion"]

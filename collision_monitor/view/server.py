@@ -36,8 +36,7 @@ def start_server(host: str = LOOPBACK, port: int = PORT, allowed: Iterable[str] 
         import viser
     except ImportError as error:
         raise UnsupportedError(
-            f"view: expected the package viser, got: {error}; "
-            "`make setup` installs it, or `pip install '.[view]'`"
+            f"view: expected the package viser, got: {error}; `make setup` installs it, or `pip install '.[view]'`"
         ) from None
     hosts = OwnHosts(host, allowed)
     chosen = _free_port(host, port)

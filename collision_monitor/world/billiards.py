@@ -28,9 +28,7 @@ FRICTION: Final = 0.1
 class Billiards(RigidScene):
     """Scene "billiards": id 1 is the cue ball, 2..n the triangle. The seed turns and speeds the shot."""
 
-    def __init__(
-        self, objects: int | None, seed: int, rate: float | None, choice: ResponseChoice = AS_USUAL
-    ) -> None:
+    def __init__(self, objects: int | None, seed: int, rate: float | None, choice: ResponseChoice = AS_USUAL) -> None:
         self.name = "billiards"
         self.rate = positive_rate(rate, 100.0)
         count = object_count(objects, 16, 2, 500, self.name)

@@ -44,9 +44,7 @@ DEPTH: Final = 0.1
 class Pendulums(Scene):
     """Scene "pendulums": ids 1..n; the seed pulls one to three balls of each row. Rows swing along x."""
 
-    def __init__(
-        self, objects: int | None, seed: int, rate: float | None, choice: ResponseChoice = AS_USUAL
-    ) -> None:
+    def __init__(self, objects: int | None, seed: int, rate: float | None, choice: ResponseChoice = AS_USUAL) -> None:
         self.name = "pendulums"
         self.rate = positive_rate(rate, 100.0)
         count = object_count(objects, 15, 1, 500, self.name)

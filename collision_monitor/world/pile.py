@@ -32,9 +32,7 @@ class Pile(RigidScene):
 
     parts: ClassVar[int] = 2
 
-    def __init__(
-        self, objects: int | None, seed: int, rate: float | None, choice: ResponseChoice = AS_USUAL
-    ) -> None:
+    def __init__(self, objects: int | None, seed: int, rate: float | None, choice: ResponseChoice = AS_USUAL) -> None:
         self.name = "pile"
         self.rate = positive_rate(rate, 100.0)
         count = object_count(objects, 20, 1, 500, self.name)

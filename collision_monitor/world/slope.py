@@ -34,9 +34,7 @@ class Slope(RigidScene):
 
     parts: ClassVar[int] = 2
 
-    def __init__(
-        self, objects: int | None, seed: int, rate: float | None, choice: ResponseChoice = AS_USUAL
-    ) -> None:
+    def __init__(self, objects: int | None, seed: int, rate: float | None, choice: ResponseChoice = AS_USUAL) -> None:
         self.name = "slope"
         self.rate = positive_rate(rate, 100.0)
         count = object_count(objects, 16, 1, 500, self.name)

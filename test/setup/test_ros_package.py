@@ -20,7 +20,7 @@ import stages
 from collision_monitor._version import VERSION
 
 ROOT = Path(__file__).parents[2]
-EXECUTABLES = {"monitor", "guard", "world", "replay", "collision-monitor"}
+EXECUTABLES = {"monitor", "guard", "gate", "world", "replay", "collision-monitor"}
 COLCON = "import sys; from colcon_core.command import main; sys.exit(main())"
 
 PREFIXES = ":".join(filter(None, (sys.prefix, os.environ.get("AMENT_PREFIX_PATH"))))

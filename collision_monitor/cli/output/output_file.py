@@ -23,9 +23,7 @@ def add_force(parser: argparse.ArgumentParser, files: str = "existing files") ->
     parser.add_argument("--force", action="store_true", help=f"overwrite {files}")
 
 
-def check_outputs(
-    outputs: Mapping[str, Path | None], *, force: bool, inputs: Iterable[str | Path | None] = ()
-) -> None:
+def check_outputs(outputs: Mapping[str, Path | None], *, force: bool, inputs: Iterable[str | Path | None] = ()) -> None:
     """Check before the work that a command may write its files. Raises UsageError, SessionError.
 
     outputs: path of each option, None if it was not given. inputs: what the command reads, as in `check_output`; names

@@ -101,8 +101,17 @@ def _raise_times(typing_context: Any, numbers: Any, enough: Any, work: Any, othe
 
 @device
 def _raise_along(
-    n: Vector, blocks_a: Any, leaf_a: int, blocks_b: Any, leaf_b: int, X: Placing, move: Approach, aim: float,
-    enough: float, pair: int, work: Any,
+    n: Vector,
+    blocks_a: Any,
+    leaf_a: int,
+    blocks_b: Any,
+    leaf_b: int,
+    X: Placing,
+    move: Approach,
+    aim: float,
+    enough: float,
+    pair: int,
+    work: Any,
 ) -> None:
     """Raise the times of all pairs to those until which they stay `aim` (m) apart along a direction n.
 
@@ -141,8 +150,18 @@ def _raise_along(
 
 @device
 def leaf_time(
-    blocks_a: Any, place_a: int, leaf_a: int, blocks_b: Any, place_b: int, leaf_b: int, X: Placing, move: Approach,
-    tolerance: float, enough: float, pair: int, work: Any,
+    blocks_a: Any,
+    place_a: int,
+    leaf_a: int,
+    blocks_b: Any,
+    place_b: int,
+    leaf_b: int,
+    X: Placing,
+    move: Approach,
+    tolerance: float,
+    enough: float,
+    pair: int,
+    work: Any,
 ) -> tuple[float, int]:
     """Return a time until which all triangles of two leaves stay apart, and the pair that limits it.
 

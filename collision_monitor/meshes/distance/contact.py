@@ -47,8 +47,15 @@ def in_root_box(tree: NDArray[np.float64], points: NDArray[np.float64]) -> NDArr
 
 @outlined
 def tree_contact(
-    blocks_a: Any, root_a: int, blocks_b: Any, root_b: int, pose: PairPose, limit: float,
-    out: Any, answer: Any, work: Any,
+    blocks_a: Any,
+    root_a: int,
+    blocks_b: Any,
+    root_b: int,
+    pose: PairPose,
+    limit: float,
+    out: Any,
+    answer: Any,
+    work: Any,
 ) -> int:
     """Write the contact of two trees into a contact row if they are at most `limit` (m) apart; return what is known.
 
@@ -90,4 +97,3 @@ def tree_contact(
         known = OPEN
     write(out, distance, rotate(pose.R_A, n), rotate(pose.R_A, on_a), round_off)
     return known
-

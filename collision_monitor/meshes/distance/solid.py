@@ -169,8 +169,15 @@ def triangle_solid_contact(
 
 @device
 def solid_contact(
-    blocks: Any, root: int, margin: float, table: Any, b: int, pose: PairPose, limit: float,
-    out: Any, memory: SolidMemory,
+    blocks: Any,
+    root: int,
+    margin: float,
+    table: Any,
+    b: int,
+    pose: PairPose,
+    limit: float,
+    out: Any,
+    memory: SolidMemory,
 ) -> bool:
     """Write the contact of a tree A, enlarged by a margin (m), and a solid b; False if it is farther than the limit.
 

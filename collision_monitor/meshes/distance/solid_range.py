@@ -33,8 +33,15 @@ MOST_EXAMINED: Final = 300
 
 @outlined
 def solid_range(
-    blocks: Any, root: int, margin: float, table: Any, b: int, pose: PairPose, wanted: float,
-    out: Any, memory: SolidMemory,
+    blocks: Any,
+    root: int,
+    margin: float,
+    table: Any,
+    b: int,
+    pose: PairPose,
+    wanted: float,
+    out: Any,
+    memory: SolidMemory,
 ) -> tuple[float, float]:
     """Bounds (m) on the signed distance of a tree A, enlarged by a margin (m), and a solid b, at most `wanted` apart.
 

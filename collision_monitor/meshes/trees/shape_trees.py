@@ -93,4 +93,3 @@ def made_tree(shape: Shape, split: int = 0) -> Array | None:
         case Triangle():
             return tree_of(shape.points[None])
     return None
-

@@ -233,9 +233,7 @@ def _best_at(faces: Any, first: int, count: int, x: Vector, n: Vector, reach: fl
 
 @inlined
 def _height(faces: Any, f: int, x: Vector) -> float:
-    return float(
-        faces.planes[f, 0] * x[0] + faces.planes[f, 1] * x[1] + faces.planes[f, 2] * x[2] - faces.planes[f, 3]
-    )
+    return float(faces.planes[f, 0] * x[0] + faces.planes[f, 1] * x[1] + faces.planes[f, 2] * x[2] - faces.planes[f, 3])
 
 
 @device

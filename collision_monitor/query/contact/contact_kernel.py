@@ -35,6 +35,7 @@ class QueryMemory(threading.local):
 
 MEMORY: Final = QueryMemory()
 
+
 @settled
 @kernel
 def contact_of_chains(

@@ -16,9 +16,7 @@ from collision_monitor.shapes.pose import as_pose
 from collision_monitor.shapes.registry import Points
 
 
-def points_within(
-    cloud: Points, pose: Any, shape: Compound, shape_pose: Any, limit: float = 0.0
-) -> NDArray[np.bool_]:
+def points_within(cloud: Points, pose: Any, shape: Compound, shape_pose: Any, limit: float = 0.0) -> NDArray[np.bool_]:
     """Which points (n,) of a cloud are within `limit` (m) of a shape or a compound, or inside it, with their radius.
 
     For the robot that carries the sensor: keep the others. Of an open mesh, only the surface counts. Raises

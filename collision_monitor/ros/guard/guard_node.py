@@ -168,9 +168,7 @@ class GuardNode(Node):
         """Publish what the guard does, because that has changed."""
         self._state_out.publish(String(data=self._report.text))
         if self._nav2_out is not None:
-            self._nav2_out.publish(
-                self._nav2(action_type=int(decision.action), polygon_name=decision.verdict.rule)
-            )
+            self._nav2_out.publish(self._nav2(action_type=int(decision.action), polygon_name=decision.verdict.rule))
         self._diagnostics.publish()
 
 
