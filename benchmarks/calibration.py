@@ -230,8 +230,14 @@ def compare(scene: Scene, profile: Profile, futures: int, rng: np.random.Generat
     late = np.mean(times > reported["latest"]) if reported["latest"] < inf else np.nan
     early = np.mean(hits < reported["earliest"]) if len(hits) > 20 else np.nan
     return Row(
-        kinds, True, int(reported["status"]), float(reported["probability"]), len(hits) / futures, float(early),
-        float(late), us,
+        kinds,
+        True,
+        int(reported["status"]),
+        float(reported["probability"]),
+        len(hits) / futures,
+        float(early),
+        float(late),
+        us,
     )
 
 

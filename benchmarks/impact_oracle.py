@@ -67,9 +67,7 @@ def states(rng: np.random.Generator, shape: Shape) -> Array:
 
 
 @kernel
-def overlaps_before(
-    moving: Any, step: float, until: Any, deep: float, scratch: Any, found: Any
-) -> None:
+def overlaps_before(moving: Any, step: float, until: Any, deep: float, scratch: Any, found: Any) -> None:
     """Write the first sample (s) before `until` (N,) at which each pair is deeper than `deep` (m) into found (N,).
 
     Infinite if there is none.

@@ -384,9 +384,7 @@ def draw(results: dict[tuple[str, str, float], Score], path: Path) -> None:
         axis.spines[["top", "right", "bottom"]].set_visible(False)
         axis.set_xticks([])
     axes[0].set_yticks(place, [f"{kind.name}: {model}" for kind, model in rows], fontsize=8)
-    figure.suptitle(
-        "What a prediction is worth, by what the states say of the motion (2 s ahead)", x=0.01, ha="left"
-    )
+    figure.suptitle("What a prediction is worth, by what the states say of the motion (2 s ahead)", x=0.01, ha="left")
     figure.tight_layout()
     figure.savefig(path, dpi=120)
 

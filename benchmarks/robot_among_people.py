@@ -154,6 +154,7 @@ def play(bag: Path, child: Child) -> Played:
     """Play a bag in real time and collect the predictions."""
     import rclpy
     from rclpy.qos import DurabilityPolicy, QoSProfile
+
     node = rclpy.create_node("bag")
     messages: list[Any]
     with Bag(bag) as opened:

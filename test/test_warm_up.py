@@ -133,7 +133,9 @@ def test_the_command_compiles_what_is_not_compiled_and_says_where_it_is(warmed: 
     assert "expected parts of monitor, options, functions, got 'robots'" in wrong.stderr
 
 
-WATCHED = START + """
+WATCHED = (
+    START
+    + """
 from collision_monitor import warm_up
 from collision_monitor._jit.kernel_cache import KernelCache
 from collision_monitor.settings.profile import Profile
@@ -146,6 +148,7 @@ def watch(self, sig, target):
 
 KernelCache.load_overload = watch
 """
+)
 CERTAIN_SESSION = re.sub(r"    if step == 5:\n.*\n    if step in .*\n.*\n", "", SESSION)
 
 

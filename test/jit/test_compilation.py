@@ -27,7 +27,9 @@ double(1)  # another type: compiled outside of the block
 """
 
 
-LOADING = PROGRAM.partition("with telling")[0] + """
+LOADING = (
+    PROGRAM.partition("with telling")[0]
+    + """
 from collision_monitor._jit.compilation import compiling_nothing
 
 with compiling_nothing():
@@ -36,6 +38,7 @@ with compiling_nothing():
     print("never")
 print(triple(1.0))
 """
+)
 
 
 def test_only_what_is_compiled_already_is_called(tmp_path: Path) -> None:

@@ -13,7 +13,8 @@ LOOP = """
             total += sqrt(values[m] + {0}.0) / (n + values[m - {0}] + 1.0) if m % {0} else values[m] - total
 """
 
-MODULE = """
+MODULE = (
+    """
 from math import sqrt
 from numba import prange
 from collision_monitor._jit import device, kernel, parallel_kernel
@@ -21,7 +22,9 @@ from collision_monitor._jit import device, kernel, parallel_kernel
 @device
 def inner(unread, values, k):  # so large that LLVM does not inline it
     total = 0.0
-""" + "".join(LOOP.format(k) for k in range(1, 10)) + """
+"""
+    + "".join(LOOP.format(k) for k in range(1, 10))
+    + """
     return total
 
 @kernel
@@ -36,6 +39,7 @@ def parallel(unread, values, out):
         out[k] = inner(unread, values, k) + inner(unread, values, 2 * k) + inner(unread, values, 3 * k)
     return 0
 """
+)
 
 PROGRAM = """
 import numpy as np

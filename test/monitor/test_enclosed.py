@@ -29,6 +29,7 @@ SMALL = {
     "compound": [(cm.Sphere(0.1), cm.Pose((0, 0, 0.2))), (cm.Cylinder(0.1, 0.2), cm.Pose())],
 }
 
+
 def _step(shape: cm.Shape, x: float, swap: bool, speed: float = 0.0) -> cm.StepResult:
     monitor = cm.Monitor()
     ids = (2, 1) if swap else (1, 2)

@@ -51,9 +51,7 @@ def supported():
         return []
     cases = json.loads(CASES.read_text())["cases"]
     return [
-        c
-        for c in cases
-        if c["dim"] == 3 and shape(c["shapeA"]) and shape(c["shapeB"]) and "toi" not in c["expected"]
+        c for c in cases if c["dim"] == 3 and shape(c["shapeA"]) and shape(c["shapeB"]) and "toi" not in c["expected"]
     ]
 
 

@@ -18,9 +18,7 @@ def random_bodies(seed):
     bodies = []
     for _ in range(2):
         spread = rng.normal(size=(3, 3))
-        bodies.append(
-            RigidBody(rng.uniform(0.1, 10), spread @ spread.T + 0.1 * np.eye(3), *rng.normal(size=(3, 3)))
-        )
+        bodies.append(RigidBody(rng.uniform(0.1, 10), spread @ spread.T + 0.1 * np.eye(3), *rng.normal(size=(3, 3))))
     return *bodies, rng.normal(size=3), rng.normal(size=3)
 
 

@@ -66,7 +66,12 @@ def test_the_package_is_in_the_ament_index(install: Path) -> None:
     prefix, share = map(Path, answer.stdout.splitlines())
     assert prefix == install / "collision_monitor"
     installed = {str(path.relative_to(share)) for folder in ("config", "launch") for path in (share / folder).iterdir()}
-    assert {"config/monitor.yaml", "launch/monitor.launch.py", "launch/demo.launch.py"} <= installed
+    assert {
+        "config/monitor.yaml",
+        "launch/monitor.launch.py",
+        "launch/demo.launch.py",
+        "launch/gate.launch.py",
+    } <= installed
     assert (share / "package.xml").is_file()
 
 

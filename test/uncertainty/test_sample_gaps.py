@@ -126,7 +126,17 @@ def test_gaps_are_those_of_the_turned_shapes(order: int, mode: int, axis: int | 
         planes = obstacle.planes[0, :1]
         planes[0, :3], planes[0, MODE] = n / np.linalg.norm(n), mode
         enter_planes(
-            table, pair, planes, 0.05, orders, obstacle.node[:2], obstacle.middle[0], 0, SAMPLES, rows, memory.entry,
+            table,
+            pair,
+            planes,
+            0.05,
+            orders,
+            obstacle.node[:2],
+            obstacle.middle[0],
+            0,
+            SAMPLES,
+            rows,
+            memory.entry,
             memory.leave,
         )
         for end in range(2):

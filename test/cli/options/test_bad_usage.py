@@ -39,9 +39,7 @@ EXAMPLE = Path(__file__).parents[3] / "config" / "monitor.yaml"
     ],
     ids=" ".join,
 )
-def test_numbers_out_of_range_are_wrong_usage(
-    arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_numbers_out_of_range_are_wrong_usage(arguments: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as stopped:
         make_parser().parse_args(arguments)
     assert stopped.value.code == 2

@@ -64,9 +64,7 @@ def test_polygons_overlap_alike_by_distance_sat_and_edges(seed: int) -> None:
         shapes.append(cm.Polygon(far * np.stack([np.cos(angle), np.sin(angle)], axis=1)))
     turn = rng.uniform(-3, 3, 2)
     poses = [cm.Pose((x, 0, 0), (0, 0, np.sin(t / 2), np.cos(t / 2))) for x, t in zip((0.0, 1.1), turn, strict=True)]
-    answers = {
-        test: cm.overlap(shapes[0], poses[0], shapes[1], poses[1], test) for test in ("contact", "sat", "edges")
-    }
+    answers = {test: cm.overlap(shapes[0], poses[0], shapes[1], poses[1], test) for test in ("contact", "sat", "edges")}
     assert len(set(answers.values())) == 1, answers
 
 

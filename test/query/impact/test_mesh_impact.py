@@ -20,8 +20,14 @@ MESHES = {
     "half": cm.Mesh(TORUS.vertices, TORUS.faces[TORUS.triangles_center[:, 0] > 0]),
     "soup": cm.Mesh(SOUP.reshape(-1, 3), np.arange(180).reshape(-1, 3)),
 }
-OTHERS = {**MESHES, "box": cm.Box((0.5, 0.3, 0.8)), "capsule": cm.Capsule(0.2, 0.6),
-          "cylinder": cm.Cylinder(0.3, 0.6), "cone": cm.Cone(0.3, 0.7), "ellipsoid": cm.Ellipsoid((0.2, 0.3, 0.5))}
+OTHERS = {
+    **MESHES,
+    "box": cm.Box((0.5, 0.3, 0.8)),
+    "capsule": cm.Capsule(0.2, 0.6),
+    "cylinder": cm.Cylinder(0.3, 0.6),
+    "cone": cm.Cone(0.3, 0.7),
+    "ellipsoid": cm.Ellipsoid((0.2, 0.3, 0.5)),
+}
 
 
 def turning_pair(rng):

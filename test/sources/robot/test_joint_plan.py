@@ -107,7 +107,9 @@ def test_joints_that_leave_the_plan_go_on_at_their_rates() -> None:
     played.joints(START + 20 * MILLISECOND, *goes(0.01))
     away = np.array([0.4, 0.3, 0.2, 0.1, 0.3, 0.2, 0.1, 0.0])
     played.joints(START + 40 * MILLISECOND, PLACE - 0.3, away)
-    assert any("left the plan: joint_" in each and "is 0.300 rad or m off" in each for each in played.refusals), played.refusals
+    assert any("left the plan: joint_" in each and "is 0.300 rad or m off" in each for each in played.refusals), (
+        played.refusals
+    )
     assert plans_of(played)["arm/hand"].then == Then.GO_ON
     count = len(played.plans)
     played.joints(START + 60 * MILLISECOND, PLACE - 0.3 + 0.02 * away, away)

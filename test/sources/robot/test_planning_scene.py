@@ -32,6 +32,7 @@ from collision_monitor.shapes.pose import Pose, multiply, rotation_matrix
 
 TF = "tf2_msgs/msg/TFMessage"
 
+
 def test_solids_become_shapes() -> None:
     square, cross = [(0, 0), (1, 0), (1, 1), (0, 1)], [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]
     triangle = message("shape_msgs/msg/MeshTriangle", vertex_indices=np.array([0, 1, 2], np.uint32))

@@ -234,7 +234,7 @@ def test_a_monitor_predicts_the_first_hit_of_the_cue_ball():
     scene = make_scene("billiards", seed=4)
     monitor = Monitor()
     for each in scene.descriptions:
-        (shape, _), = each.shapes
+        ((shape, _),) = each.shapes
         pose = each.pose if each.static else None
         monitor.add(each.object_id, shape, static=each.static, pose=pose, group=each.group, mask=each.mask)
     result = monitor.step(0, scene.states())
