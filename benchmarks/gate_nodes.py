@@ -20,7 +20,7 @@ PLACE: Final = np.array([0.0, 0.2, 0.0, -2.0, 0.0, 2.2, 0.785, 0.03])
 
 SOURCES: Final = f"""\
 frame: map
-rate: 40
+rate: 30
 objects:
   cart: {{topic: /odom, shape: {{cylinder: [0.3, 0.4]}}, allowed: [load]}}
   load: {{topic: /load, shape: {{box: [0.3, 0.9, 0.3]}}, allowed: [cart]}}
@@ -36,8 +36,8 @@ from joint_controller import JointController  # noqa: E402
 class GateNodes:
     """A monitor, a gate of an arm and one of a base, and what planners, controllers and sensors say to them.
 
-    robots: kept by the caller. said: the newest state of the gate in use. told: monotonic s of its first message to the
-    controller that slows the robot down, since it was set to None.
+    robots: of the caller, by name. used: name of the one that executes a plan. said: the newest state of its gate.
+    told: monotonic s of its first message that slows the robot down, since it was set to None.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -61,7 +61,7 @@ class GateNodes:
         ]
         self.controller = JointController(ARM_JOINTS, PLACE, delay=0.03)
         self._states = {"arm": "", "base": ""}
-        self._used, self.is_passed, self.told = "base", False, None
+        self.used, self.is_passed, self.told = "base", False, None
         self._commands: list[tuple[float, float]] = []
         rclpy.init()
         self.node = rclpy.create_node("executions")
@@ -130,7 +130,7 @@ class GateNodes:
             self._states[name] = message.data
 
         def on_scale(message: Any) -> None:
-            if name == self._used and message.data < 1.0 and self.told is None:
+            if name == self.used and message.data < 1.0 and self.told is None:
                 self.told = time.monotonic()
 
         self.node.create_subscription(text, f"/{name}_gate/state", on_state, latched)
@@ -138,10 +138,10 @@ class GateNodes:
 
     def _on_trajectory(self, message: Any) -> None:
         self.controller.take(message, time.monotonic())
-        self.is_passed |= bool(message.points) and self._used == "arm"
+        self.is_passed |= bool(message.points) and self.used == "arm"
 
     def _on_path(self, message: Any) -> None:
-        self.is_passed |= bool(message.poses) and self._used == "base"
+        self.is_passed |= bool(message.poses) and self.used == "base"
 
     def _on_command(self, message: Any) -> None:
         self._commands.append((time.monotonic(), message.twist.linear.x))
@@ -149,7 +149,7 @@ class GateNodes:
 
     def use(self, name: str) -> None:
         """Use the gate of the arm or of the base from now on."""
-        self._used = name
+        self.used = name
 
     def forget(self) -> None:
         """Forget what was passed so far."""
@@ -158,7 +158,7 @@ class GateNodes:
     @property
     def said(self) -> str:
         """The newest state of the gate in use."""
-        return self._states[self._used]
+        return self._states[self.used]
 
     @property
     def is_ready(self) -> bool:

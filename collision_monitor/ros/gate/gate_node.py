@@ -39,6 +39,7 @@ from collision_monitor.ros.gate.gate_parameters import read_gate_parameters
 from collision_monitor.ros.gate.gated_commands import GatedCommands
 from collision_monitor.ros.gate.gated_plan import GatedPlan, RateChange
 from collision_monitor.ros.gate.gatekeeper import Gatekeeper, LeftPlanError
+from collision_monitor.ros.gate.plan_conflicts import load_plan_conflicts
 from collision_monitor.ros.guard.guard_report import Decision, GuardReport
 from collision_monitor.ros.guard.monitor_answers import ClockReading, Fault
 from collision_monitor.ros.guard.speed_limit import SpeedVerdict
@@ -70,6 +71,7 @@ class GateNode(Node):
         except CollisionMonitorError:
             self.destroy_node()
             raise
+        load_plan_conflicts()
         self._keeper = Gatekeeper(given.patterns, given.base, given.monitor, given.ages, given.limits)
         self._looked = 0.0
         self._report = GuardReport(self.get_logger(), self._keeper.world.robot, "gate")

@@ -16,6 +16,8 @@ from collision_monitor.query.conflicts.conflicts import Conflict, conflicts
 from collision_monitor.query.contact.contact import contact
 from collision_monitor.ros.gate.gated_world import GatedWorld
 from collision_monitor.ros.guard.speed_limit import STANDS
+from collision_monitor.shapes.pose import Pose
+from collision_monitor.shapes.registry import Box, HalfSpace, Sphere
 
 Floats = NDArray[np.float64]
 
@@ -72,6 +74,16 @@ def plan_conflicts(
         separation = sight.clearance + padding + wide
         found += _conflicts(world, plans, others, until, separation, sight)
     return sorted(found, key=lambda each: each.entry[0])
+
+
+def load_plan_conflicts() -> None:
+    """Compile the kernels of convex shapes, or load them from the cache, before a plan arrives."""
+    way = Trajectory([0.0, 1.0, 2.0], [(0, 0, 0), (1, 0, 0), (1, 1, 0, 0, 0, 1, 0)], between="arc", tube=1e-3)
+    box, ball = [(Box((0.1, 0.1, 0.1)), Pose())], Sphere(0.1)
+    plans = {"a": way, "b": Motion((0.5, -1, 0), (0, 1, 0))}
+    for static in ((ball, Pose((0.8, 0, 0))), (HalfSpace((0, 0, 1), 0.0), Pose())):
+        found = conflicts({"a": box, "b": ball}, plans, {"static": static}, 2.0, separation=0.05)
+        assert found[0].contact is not None
 
 
 def self_conflicts(world: GatedWorld, plans: Mapping[int, Trajectory], until: float) -> list[PlanConflict]:
