@@ -33,7 +33,7 @@ import collision_monitor as cm
 STANDS: Final = 0.01  # m/s
 TICK: Final = 0.025  # s
 PATIENCE: Final = 600.0  # s for the nodes; a first start compiles kernels
-HOLDS: Final = 0.5  # s that an obstacle stays after the robot stands
+HOLDS: Final = 0.3  # s that an obstacle stays after the robot stands
 SEEN: Final = 0.02  # m
 IN_TIME: Final = 1.0
 """s: an encounter that comes sooner than this after the appearance is drawn again, as nothing can stop for it: 0.3 s of
@@ -329,7 +329,7 @@ class Execution:
         stood: float | None = None
         while self._now - self._met < robot.seconds + 4.0:
             self._step()
-            if nodes.told is not None and outcome.told is None:
+            if nodes.told is not None and outcome.told is None and "no plan" not in nodes.said:  # that is its end
                 outcome.told, outcome.said = nodes.told - self._met, nodes.said
             if robot.is_done():
                 outcome.ended = True

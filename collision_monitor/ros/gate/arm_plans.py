@@ -150,6 +150,15 @@ class GatedArm:
         return motion.pose @ Pose(here[row, :3], here[row, 3:]).inverse()
 
 
+def message_to_hold(source: ArmSource, joints: Floats, stop_time: float) -> JointTrajectory:
+    """Return a JointTrajectory that lets the joints (J, 2), positions and rates now, come to a stop in `stop_time` (s).
+
+    Controllers do not agree on what a message without points means.
+    """
+    there = np.stack([joints[:, 0] + 0.5 * stop_time * joints[:, 1], np.zeros(len(joints))], axis=1)
+    return _message(source, np.array([stop_time]), there[None], np.zeros(1))
+
+
 def message_at(source: ArmSource, change: RateChange) -> JointTrajectory:
     """Return what is left of a plan as a JointTrajectory that starts now, at a rate that changes.
 

@@ -94,9 +94,11 @@ class Execution:
         return f"the robot is {abs(times[k] - expected):.2f} s {word} on the plan"
 
     def is_over(self, now_ns: int) -> bool:
-        """Whether the robot is at the end of a plan that goes by the clock."""
-        at_end = self.plan.end - self.progress.time <= self.limits.time_tolerance
-        return self.timed and at_end and self.commanded(now_ns) >= self.plan.end and self.change.target > 0.0
+        """Whether a plan that goes by the clock came to its end so long ago that a late robot is there too."""
+        if not self.timed or self.change.target == 0.0:
+            return False
+        before = np.maximum(self._since(now_ns) - self.limits.time_tolerance, 0.0)
+        return bool(self.change.plan_time(before)[0] >= self.plan.end)
 
     # -- how it goes on
 

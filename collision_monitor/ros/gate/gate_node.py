@@ -32,7 +32,7 @@ from collision_monitor.robots.link_plans import load_link_plans
 from collision_monitor.robots.robot import Description
 from collision_monitor.robots.urdf import parse_urdf
 from collision_monitor.ros.endpoints import subscription
-from collision_monitor.ros.gate.arm_plans import GatedArm, message_at
+from collision_monitor.ros.gate.arm_plans import GatedArm, message_at, message_to_hold
 from collision_monitor.ros.gate.base_plans import base_plan
 from collision_monitor.ros.gate.checking import CheckService
 from collision_monitor.ros.gate.gate_parameters import read_gate_parameters
@@ -222,8 +222,13 @@ class GateNode(Node):
             return Decision(SpeedVerdict(0.0, "", fault.text), fault), change
 
     def _leave(self, why: str) -> None:
-        """Drop a plan that the robot does not follow: a message without points lets a controller hold its place."""
-        self._plan_out.publish(JointTrajectory() if self._given.is_arm else PathMessage())
+        """Drop a plan that the robot does not follow, and let it stop where it is."""
+        it, joints = self._keeper.execution, self._joints
+        if it is not None and it.timed and joints is not None:
+            values, _, _ = joints.at(self._reading().stamp_ns)
+            self._plan_out.publish(message_to_hold(it.plan.source, values, self._given.limits.stop_time))
+        else:
+            self._plan_out.publish(PathMessage())
         self._keeper.drop(why)
 
     def _send(self, change: RateChange) -> None:

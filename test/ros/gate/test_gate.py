@@ -185,7 +185,9 @@ def test_a_controller_that_never_starts_is_noticed(cell: Cell) -> None:
     cell.controller.delay = 1e9
     cell.plan_out.publish(swing())
     cell.live(lambda: cell.hears("the controller has not started"))
-    assert not cell.sent[-1].points  # it is told to hold its place
+    (point,) = cell.sent[-1].points  # it is told to hold its place
+    np.testing.assert_allclose(point.positions, PLACE, atol=1e-9)
+    assert not np.array(point.velocities).any()
 
 
 def test_without_a_monitor_it_stops_the_arm(cell: Cell, start: Any) -> None:

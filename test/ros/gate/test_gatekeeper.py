@@ -314,7 +314,7 @@ def executed(
 
 def test_an_execution_without_obstacles_is_never_slowed() -> None:
     scene = ArmScene()
-    found = executed(scene, at, 3.1, lambda t: [])
+    found = executed(scene, at, 3.6, lambda t: [])
     assert {factor for _, factor, _ in found} == {1.0}
     assert scene.keeper.execution is not None and scene.keeper.execution.is_over(scene.now_ns)
 
