@@ -194,8 +194,9 @@ def test_versions_agree() -> None:
 
 
 def test_every_message_is_built() -> None:
-    listed = set(re.findall(r"msg/\w+\.msg", (ROOT / "collision_monitor_msgs" / "CMakeLists.txt").read_text()))
-    assert listed == {f"msg/{path.name}" for path in (ROOT / "collision_monitor_msgs" / "msg").glob("*.msg")}
+    folder = ROOT / "collision_monitor_msgs"
+    listed = set(re.findall(r"(?:msg|srv)/\w+\.(?:msg|srv)", (folder / "CMakeLists.txt").read_text()))
+    assert listed == {f"{path.parent.name}/{path.name}" for kind in ("msg", "srv") for path in folder.glob(f"{kind}/*")}
 
 
 def test_what_is_imported_is_declared() -> None:

@@ -56,10 +56,10 @@ class GatedWorld:
     def describe(self, message: ObjectDescriptionArray) -> None:
         """Take over descriptions; a snapshot replaces all."""
         self.robot.describe(message)
+        measured, names = dict(self.measured), {each: it.name for each, it in self.described.items()}
         if message.snapshot:
-            self.described.clear()
-            self.measured.clear()
-            self.reaches.clear()
+            for known in (self.described, self.measured, self.reaches):
+                known.clear()
         for each in message.objects:
             if isinstance(each, Removal):
                 self.described.pop(each.object_id, None)
@@ -68,6 +68,9 @@ class GatedWorld:
             else:
                 self.described[each.object_id] = each
                 self.reaches[each.object_id] = radius_of(each.shapes)
+        if message.snapshot:  # which comes with every new subscriber of the monitor, and changes no place
+            named = {each: it.name for each, it in self.described.items()}
+            self.measured = {each: it for each, it in measured.items() if named.get(each) == names[each]}
 
     def move(self, message: ObjectStateArray, arrived: float) -> None:
         """Take over states. One that is not finite is left out, so that its object grows old."""

@@ -120,6 +120,8 @@ class Gatekeeper:
             return Decision(SpeedVerdict(0.0, "", reason), fault, refused=bool(self.last)), None
         if fault is not None:
             return Decision(SpeedVerdict(0.0, "", fault.text), fault), self._change(it, 0.0, now.stamp_ns)
+        if it.plan.bodies.keys() != self.world.own.keys():
+            raise LeftPlanError("the objects of the robot have changed since the plan: it needs a new one")
         if left := it.follow(self.world, now.stamp_ns):
             raise LeftPlanError(left)
         rate, found = it.look(self.world, now.stamp_ns)

@@ -98,7 +98,7 @@ def _motion(message: Any, tree: KinematicTree, start: Floats, begin: float) -> J
     if len(points) > MOST_JOINT_POINTS:
         raise InputError(f"points: expected at most {MOST_JOINT_POINTS}, got {len(points)}")
     times = [begin + it.time_from_start.sec + 1e-9 * it.time_from_start.nanosec for it in points]
-    rows = []
+    rows: list[Floats | None] = []
     for what in ("positions", "velocities", "accelerations"):
         given = [getattr(it, what) for it in points]
         lengths = {len(each) for each in given}

@@ -79,8 +79,12 @@ class RobotSource(Source):
         self._plans: RobotPlans | None = None
         self._planned: JointPlan | None = None  # what the joints are to do
         self._unknown_joints: set[str] = set()
-        topics = {entry.joint_states: (JOINT_STATE,), entry.urdf_topic: (TEXT,), entry.srdf_topic: (TEXT,)}
-        topics[entry.plan] = (JOINT_TRAJECTORY, DISPLAY_TRAJECTORY)
+        topics: dict[str, tuple[str, ...]] = {
+            entry.joint_states: (JOINT_STATE,),
+            entry.urdf_topic: (TEXT,),
+            entry.srdf_topic: (TEXT,),
+            entry.plan: (JOINT_TRAJECTORY, DISPLAY_TRAJECTORY),
+        }
         self.topics: Table[str, tuple[str, ...]] = {
             topic: types for topic, types in {**topics, **self._base.topics}.items() if topic
         }

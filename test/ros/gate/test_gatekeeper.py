@@ -14,7 +14,7 @@ from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
 import collision_monitor as cm
 from collision_monitor import records
-from collision_monitor.codec import CollisionAlertArray, ObjectDescriptionArray, ObjectStateArray
+from collision_monitor.codec import CollisionAlertArray, ObjectDescriptionArray, ObjectStateArray, Removal
 from collision_monitor.objects.description import ObjectDescription
 from collision_monitor.records import StateFlag
 from collision_monitor.robots.kinematic_tree import kinematic_tree
@@ -375,6 +375,27 @@ def test_an_object_without_states_stops_it() -> None:
         scene.tell(*scene.links(at(0.05 * k)), after=0.05)
     decision, _ = scene.keeper.decide(scene.now)
     assert decision.fault is not None and "no state of 'person' for 1." in decision.fault.text
+
+
+def test_a_snapshot_for_a_new_subscriber_does_not_stop_it() -> None:
+    scene = ArmScene()
+    scene.describe(ObjectDescription(1, Sphere(0.1), name="person"))
+    executed(scene, at, 0.5, lambda t: [row(1, (5, 5, 0))])
+    every = tuple(scene.world.described.values())
+    scene.world.describe(ObjectDescriptionArray(scene.now_ns, "world", True, every))
+    decision, _ = scene.keeper.decide(scene.now)
+    assert decision.fault is None and decision.verdict.factor == 1.0, decision
+
+
+def test_a_robot_whose_objects_change_needs_a_new_plan() -> None:
+    for change in (Removal(17), ObjectDescription(5, Sphere(0.1), name="arm/load")):
+        scene = ArmScene()
+        executed(scene, at, 0.5, lambda t: [])
+        scene.world.describe(ObjectDescriptionArray(scene.now_ns, "world", False, (change,)))
+        extra = [row(5, (0.5, 0, 0.2))] if isinstance(change, ObjectDescription) else []
+        scene.tell(*scene.links(at(0.55)), *extra, after=0.05)
+        with pytest.raises(LeftPlanError, match="objects of the robot have changed"):
+            scene.keeper.decide(scene.now)
 
 
 WRONG = [
