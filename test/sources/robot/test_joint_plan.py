@@ -7,17 +7,24 @@ from typing import Any
 
 import numpy as np
 import pytest
-from foreign_bag import STORE
+from foreign_bag import STORE, write_bag
 from foreign_messages import decoder
 from numpy.typing import NDArray
-from played_sources import JOINTS, MILLISECOND, START, Played, base_row
+from played_sources import JOINT_STATE, JOINTS, MILLISECOND, START, Played, base_row
 from ros_messages import SECOND, header, message
 from rosbags.typesys import get_types_from_msg
 from scipy.interpolate import CubicHermiteSpline
 
 import collision_monitor as cm
-from collision_monitor.codec import ObjectTrajectory
+from collision_monitor.codec import ObjectTrajectory, decode_predictions
 from collision_monitor.codec.trajectories import Then
+from collision_monitor.pipeline.topics import Topic
+from collision_monitor.records import PredictionStatus
+from collision_monitor.session import Session
+from collision_monitor.session.replaying.replay import replay
+from collision_monitor.session.replaying.replay_report import Verdict
+from collision_monitor.sources import import_bag
+from collision_monitor.sources.ground.mapping import make_mapping
 from collision_monitor.sources.robot.joint_plan import DISPLAY_TRAJECTORY, JOINT_TRAJECTORY
 
 Array = NDArray[np.float64]
@@ -185,3 +192,32 @@ def test_a_trajectory_before_the_joints_are_known_is_refused() -> None:
     played = Played(PLANNED)
     send(played, trajectory([2.0], [GOAL]))
     assert any("before the plan" in each and "joint_1" in each for each in played.refusals), played.refusals
+
+
+def test_a_bag_with_a_plan_predicts_a_post_beyond_the_joints_rates_and_replays_identically(tmp_path: Path) -> None:
+    """At rest at the start, the arm is to swing into a post: only the plan says so."""
+    robot = cm.Robot(ARM)
+    joints = np.stack([0.5 * (PLACE + GOAL), np.zeros(8)], axis=1)
+    there = robot.states(joints, base_row((1, 2, 0.5)))[0][robot.tree.links.index("hand")]
+    post = {"static": True, "pose": there[:3].tolist(), "shape": {"sphere": 0.05}}
+    messages: list[Any] = [
+        (TOPIC, START + 15 * MILLISECOND, (JOINT_TRAJECTORY, trajectory([2.0], [GOAL], [np.zeros(8)])))
+    ]
+    for k in range(20):
+        stamp = START + 10 * k * MILLISECOND
+        q, qd = goes(0.01 * k - 0.015)
+        content = message(JOINT_STATE, header=header("", stamp), name=JOINTS, position=q, velocity=qd)
+        messages.append(("/joint_states", stamp, (JOINT_STATE, content)))
+    write_bag(tmp_path / "bag", sorted(messages, key=lambda each: each[1]))
+    for plan in (TOPIC, ""):
+        entry = {**PLANNED, "plan": plan}
+        file = {"frame": "map", "rate": 50, "robots": {"arm": entry}, "objects": {"post": post}}
+        path = tmp_path / f"made{bool(plan)}.mcap"
+        result = import_bag(tmp_path / "bag", path, make_mapping(file, str(tmp_path / "sources.yaml")))
+        assert not result.refused
+        session = Session(path)
+        answers = [decode_predictions(m.data) for m in session.messages() if m.type == Topic.PREDICTIONS.message]
+        early = [each.predictions for each in answers if each.stamp_ns < START + 60 * MILLISECOND]
+        hits = [each for each in early if (each["status"] == PredictionStatus.HIT).any()]
+        assert bool(hits) is bool(plan)
+        assert replay(session).verdict is Verdict.IDENTICAL
