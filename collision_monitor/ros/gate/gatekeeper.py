@@ -79,7 +79,7 @@ class Gatekeeper:
             return None, Judgement([], fault.text)
         try:
             plan = make()
-            found = self._conflicts(plan, now.stamp_ns, self.limits.clearance)
+            found = self._conflicts(plan, now.stamp_ns, Sight(self.limits.clearance, self.limits.ahead))
             found += self_conflicts(self.world, plan.bodies, plan.end)
             found.sort(key=lambda each: each.entry[0])
             distance = self._distance(plan, now.stamp_ns) if measures else inf
@@ -87,19 +87,18 @@ class Gatekeeper:
             return None, Judgement([], str(error))
         return plan, Judgement(found, "", distance)
 
-    def _conflicts(self, plan: GatedPlan, now_ns: int, clearance: float) -> list[PlanConflict]:
+    def _conflicts(self, plan: GatedPlan, now_ns: int, sight: Sight) -> list[PlanConflict]:
         moving = set(plan.moving(0.0, plan.end))
         bodies = {each: body for each, body in plan.bodies.items() if each in moving}
-        return plan_conflicts(self.world, bodies, now_ns, plan.end, Sight(clearance, self.limits.ahead))
+        return plan_conflicts(self.world, bodies, now_ns, plan.end, sight)
 
     def _distance(self, plan: GatedPlan, now_ns: int) -> float:
-        """Bisect the largest clearance with which the plan is clear."""
-        low, high = 0.0, FARTHEST
-        if not self._conflicts(plan, now_ns, high):
-            return high
-        while high - low > FINE:
+        """Bisect the largest clearance that the robot keeps for certain, at the start too."""
+        low, high, sight = 0.0, 2.0 * FARTHEST, Sight(0.0, self.limits.ahead, parts=False)
+        while high - low > FINE and low < FARTHEST:
             middle = 0.5 * (low + high)
-            low, high = (low, middle) if self._conflicts(plan, now_ns, middle) else (middle, high)
+            meets = self._conflicts(plan, now_ns, sight._replace(clearance=middle))
+            low, high = (low, middle) if meets else (middle, high)
         return low
 
     def begin(self, plan: GatedPlan, now_ns: int, *, timed: bool) -> None:

@@ -51,11 +51,13 @@ class PlanConflict(NamedTuple):
 class Sight(NamedTuple):
     """What of the world counts. clearance: m to keep. ahead: s for which the motions of moving objects are relied on.
 
-    An object that hardly moves is relied on for as long as the plan lasts.
+    An object that hardly moves is relied on for as long as the plan lasts. parts: whether two that are too near already
+    may part; else they conflict at once.
     """
 
     clearance: float
     ahead: float
+    parts: bool = True
 
 
 def plan_conflicts(
@@ -120,7 +122,7 @@ def _conflicts(
         ):
             kept.append(_told(world, each))
     for each in near.values():
-        begin = _comes_nearer(each, until, separation)
+        begin = _comes_nearer(each, until, separation) if sight.parts else 0.0
         if begin is not None:
             kept.append(_told(world, Conflict(each.a, each.b, (begin, begin), (begin, inf), each.sides)))
     return kept

@@ -160,9 +160,10 @@ def test_the_first_conflict_is_that_of_dense_sampling() -> None:
     assert found[0] <= first and first - 0.02 < found[0], (found, first)
 
 
-def test_least_distance_is_kept_and_nearly_reached() -> None:
-    scene = ArmScene()
-    scene.describe(ObjectDescription(1, Sphere(0.1), name="ball", static=True, pose=cm.Pose((0.3, 0.3, 1.4))))
+@pytest.mark.parametrize("place", [(0.3, 0.3, 1.4), (0.5, -0.5, 0.4)])  # it comes nearer, and it moves away
+def test_least_distance_is_kept_and_nearly_reached(place: Any) -> None:
+    scene, ball = ArmScene(), cm.Pose(place)
+    scene.describe(ObjectDescription(1, Sphere(0.1), name="ball", static=True, pose=ball))
     scene.tell(*scene.links(PLACE))
     plan, judged = scene.keeper.judge(scene.plan(swing()), scene.now, measures=True)
     assert plan is not None
@@ -173,7 +174,7 @@ def test_least_distance_is_kept_and_nearly_reached() -> None:
             if name == "base":  # it stands
                 continue
             where = cm.Pose.of_numbers(poses[scene.robot.tree.links.index(name)].tolist())
-            gaps = [cm.contact(s, where @ p, Sphere(0.1), cm.Pose((0.3, 0.3, 1.4))).signed_distance for s, p in shapes]
+            gaps = [cm.contact(s, where @ p, Sphere(0.1), ball).signed_distance for s, p in shapes]
             least = min(least, *gaps)
     assert judged.distance <= least <= judged.distance + 6e-3  # a tube, and the step of the search
 
