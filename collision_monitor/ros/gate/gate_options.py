@@ -67,7 +67,7 @@ Both:
   ~/speed_scale            published, latched: std_msgs/Float64, 0 (stop) to 1
   ~/check_trajectory       service: collision_monitor_msgs/srv/CheckTrajectory: judges a plan, executes nothing
   ~/state                  published, latched: std_msgs/String, what it does and why
-  /diagnostics             published: an ERROR while it cannot tell
+  /diagnostics             published: an ERROR while it cannot judge
 
 parameters:
 {parameters}
