@@ -24,6 +24,7 @@ setup(
             "collision-monitor = collision_monitor.cli.main:main",
             "monitor = collision_monitor.ros.executables:monitor",
             "guard = collision_monitor.ros.executables:guard",
+            "gate = collision_monitor.ros.executables:gate",
             "world = collision_monitor.ros.executables:world",
             "replay = collision_monitor.cli.main:replay_main",
         ],

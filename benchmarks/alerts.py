@@ -1,6 +1,6 @@
 """Measure what alerts cost in a step, and how wrong the distance at the closest approach is.
 
-    python benchmarks/alerts.py
+python benchmarks/alerts.py
 """
 
 from __future__ import annotations

@@ -1,11 +1,12 @@
-"""Motions of links at constant joint rates, as pieces of plans whose tubes are certified.
+"""Motions of links whose joints are polynomials in time, as pieces of plans whose tubes are certified.
 
 Between two poses that forward kinematics gives, a link follows an arc: a constant twist in its own frame. How far a
 point of the link is off that arc is a smooth function of time, known at five nodes. The quartic through them is bounded
 by its Bernstein coefficients (Farouki, 2012), and the rest by the fifth derivative of the chain: each joint turns all
 that it carries, so the n-th derivative of a point is at most the sum over the segments of the chain of their length
 times the n-th power of the rates before them (as the motion bounds of Schwarzer, Saha and Latombe, 2005, for the first
-one). A link that one joint alone moves is on its arc.
+one). Where rates change, the power becomes the n-th complete Bell polynomial of the sums of the joints' derivatives
+(Faa di Bruno). A link that one joint alone moves, at a constant rate, is on its arc.
 Cubic Hermite curves in place of arcs were tried: they need fewer pieces for one link of ten.
 """
 
@@ -22,7 +23,7 @@ from collision_monitor.geometry.vector import Vector, magnitude, scaled
 from collision_monitor.motion.course import ARC, STRAIGHT, bends, place_on, screw_velocity
 from collision_monitor.motion.motion import quaternion_to_matrix, turn_between
 from collision_monitor.motion.trigonometry import sin_cos
-from collision_monitor.robots.constant_rates import NODES, JointSpans
+from collision_monitor.robots.joint_motion import NODES, JointSpans
 from collision_monitor.robots.kinematic_tree import SLIDING, TURNING, KinematicTree
 from collision_monitor.robots.link_motions import link_motions
 
@@ -59,9 +60,10 @@ class BaseBound(NamedTuple):
 class ChainBounds(NamedTuple):
     """Bounds on the motion of L links in each of S spans."""
 
-    turning: Any  # (S, L): angular speed (rad/s)
+    turning: Any  # (S, L, 5): angular speed (rad/s) and its first four derivatives
+    turned: Any  # (S, L): fifth derivative of the rotation (1/s^5)
     fifth: Any  # (S, L): fifth derivative of the origin (m/s^5)
-    screws: Any  # (S, L): number of joints that move it
+    screws: Any  # (S, L): number of joints that move it; one whose rate changes counts twice
 
 
 class LinkPieces(NamedTuple):
@@ -76,14 +78,14 @@ class LinkPieces(NamedTuple):
 def link_pieces(
     tree: KinematicTree, wanted: Wanted, spans: JointSpans, base: Floats, bound: BaseBound, tolerance: float
 ) -> LinkPieces:
-    """The plans of some links at constant joint rates. base (N, 13): motion of the base link at the nodes.
+    """The plans of some links. base (N, 13): motion of the base link at the nodes.
 
     tolerance (m): tubes are narrower, unless a link moves too fast for MOST_PIECES.
     """
     poses, _ = link_motions(tree.table, spans.joints, base)
     count, most = len(wanted.rows), (len(spans.times) - len(spans.first) + 1) // NODES + 1
     shape = len(spans.first) - 1, len(tree.links)
-    bounds = ChainBounds(np.zeros(shape), np.zeros(shape), np.zeros(shape))
+    bounds = ChainBounds(np.zeros((*shape, 5)), np.zeros(shape), np.zeros(shape), np.zeros(shape))
     found = LinkPieces(np.zeros((count, most), np.int32), np.zeros(count, np.int32), np.zeros(count), poses)
     _choose_pieces(tree.table, wanted, spans, bound, float(tolerance), bounds, found, np.zeros((5, 3, 3)))
     return found
@@ -103,23 +105,39 @@ def _choose_pieces(
 def _bound_span(table: Any, spans: Any, base: Any, s: int, bounds: Any) -> None:
     """Bound the derivatives of all links in a span: of a product of rotations and of segments that slide."""
     turning, fifth, screws = bounds.turning[s], bounds.fifth[s], bounds.screws[s]
-    begin, end = spans.first[s], spans.first[s + 1] - 1
-    turning[0], screws[0] = base.turning, base.screws
+    turning[0, 0], screws[0] = base.turning, base.screws
     fifth[0] = base.speed * base.turning**ARC_POWER
+    bounds.turned[s, 0] = _bell(turning[0])[5]
     for i in range(1, len(table.parent)):
         above, j = table.parent[i], table.variable[i]
-        w = turning[above]
+        bell = _bell(turning[above])
         x, y, z = table.position[i]
-        length, slides, speed = sqrt(x * x + y * y + z * z), 0.0, 0.0
+        fifth[i], screws[i] = fifth[above] + bell[5] * sqrt(x * x + y * y + z * z), screws[above]
+        for k in range(5):
+            turning[i, k] = turning[above, k]
         if j >= 0:
-            speed = abs(table.multiplier[i] * spans.joints[begin, j, 1])
+            factor, joint = abs(table.multiplier[i]), spans.bounds[s, j]
+            if joint[1] > 0.0:
+                screws[i] += 1.0 if joint[2] == joint[3] == joint[4] == joint[5] == 0.0 else 2.0
             if table.kind[i] == SLIDING:
-                slides = speed
-                one = abs(table.multiplier[i] * spans.joints[begin, j, 0] + table.offset[i])
-                length += max(one, abs(table.multiplier[i] * spans.joints[end, j, 0] + table.offset[i]))
-        turning[i] = w + (speed if table.kind[i] == TURNING else 0.0)
-        screws[i] = screws[above] + (1.0 if speed > 0.0 else 0.0)
-        fifth[i] = fifth[above] + w**4 * (w * length + 5.0 * slides)
+                fifth[i] += bell[5] * (factor * joint[0] + abs(table.offset[i])) + factor * (
+                    5.0 * bell[4] * joint[1] + 10.0 * bell[3] * joint[2] + 10.0 * bell[2] * joint[3]
+                    + 5.0 * bell[1] * joint[4] + joint[5]
+                )  # fmt: skip
+            if table.kind[i] == TURNING:
+                for k in range(5):
+                    turning[i, k] += factor * joint[k + 1]
+        bounds.turned[s, i] = _bell(turning[i])[5]
+
+
+@inlined
+def _bell(x: Any) -> tuple[float, float, float, float, float, float]:
+    """The complete Bell polynomials 0 to 5 of x (5,)."""
+    a, b, c, d, e = x[0], x[1], x[2], x[3], x[4]
+    second, third = a * a + b, a * a * a + 3.0 * a * b + c
+    fourth = a**4 + 6.0 * a * a * b + 4.0 * a * c + 3.0 * b * b + d
+    fifth = a**5 + 10.0 * b * a**3 + 15.0 * b * b * a + 10.0 * c * a * a + 10.0 * c * b + 5.0 * d * a + e
+    return 1.0, a, second, third, fourth, fifth
 
 
 @device
@@ -129,7 +147,7 @@ def _cut(b: int, wanted: Any, spans: Any, bounds: Any, found: Any, tolerance: fl
     n, tube, last = 0, 0.0, 0
     for s in range(len(spans.first) - 1):
         first, last = spans.first[s], spans.first[s + 1] - 1
-        limits = (bounds.turning[s, i], bounds.fifth[s, i], bounds.screws[s, i])
+        limits = (bounds.turning[s, i, 0], bounds.turned[s, i], bounds.fifth[s, i], bounds.screws[s, i])
         k, size = first, last - first
         while k < last:
             off = _error(i, r, k, size, spans.times, limits, found.poses, tolerance, work)
@@ -150,10 +168,10 @@ def _error(
 ) -> float:  # fmt: skip
     """How far (m) the points within r of link i are off the arc between the nodes k and k + size.
 
-    limits: angular speed, fifth derivative of the origin, and number of screws. An arc of several shortest pieces that
-    is off by more than the tolerance for a simple reason is not measured further.
+    limits: angular speed, fifth derivatives of rotation and origin, and number of screws. An arc of several shortest
+    pieces that is off by more than the tolerance for a simple reason is not measured further.
     """
-    turning, fifth, screws = limits
+    turning, turned, fifth, screws = limits
     h = times[k + size] - times[k]
     if screws <= 1.0 and turning * h <= MOST_TURN:
         return 0.0
@@ -163,7 +181,7 @@ def _error(
     course = ARC if bends(shift, turn) else STRAIGHT
     v, w = scaled(shift, 1.0 / h), scaled(turn, 1.0 / h)
     spin = magnitude(w)
-    rest = REST * h**5 * (fifth + turning**5 * r + spin**4 * (spin * r + magnitude(v)))
+    rest = REST * h**5 * (fifth + turned * r + spin**4 * (spin * r + magnitude(v)))
     if size > NODES and not rest <= tolerance:
         return float(rest)
     middle = k + size // 2

@@ -1,15 +1,15 @@
-"""Plans of links while the joints keep their rates, from what a caller states of the joints and the base."""
+"""Plans of links whose joints are polynomials in time, from what a caller states of the joints and the base."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from math import inf
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.checks.numbers import as_numbers, checked_number
+from collision_monitor.checks.numbers import checked_number
 from collision_monitor.errors import InputError
 from collision_monitor.motion.course import ARC
 from collision_monitor.motion.stated_motion import (
@@ -24,7 +24,8 @@ from collision_monitor.motion.stated_motion import (
     straight_motions,
 )
 from collision_monitor.motion.trajectory import FASTEST, Then, Trajectory, carried
-from collision_monitor.robots.constant_rates import constant_rates
+from collision_monitor.robots.joint_motion import JointMotion, joint_spans
+from collision_monitor.robots.joint_trajectory import numbers_by_joint
 from collision_monitor.robots.kinematic_tree import KinematicTree, kinematic_tree
 from collision_monitor.robots.link_pieces import BaseBound, LinkPieces, Wanted, link_pieces
 from collision_monitor.robots.urdf import parse_urdf
@@ -40,9 +41,6 @@ TUBE: Final = 1.5e-3
 
 LONGEST: Final = 600.0
 """s for which the motion of a robot is stated."""
-
-MOST_WORK: Final = 2_000_000
-"""Poses of links that one plan of a robot may take, 0.2 s. An arm at 1 rad/s needs 1,000."""
 
 _AXES: Final = np.concatenate([np.eye(3), -np.eye(3)])
 
@@ -61,18 +59,16 @@ class LinkPlans(NamedTuple):
 
 
 def link_plans(
-    tree: KinematicTree, wanted: Wanted, joints: Floats, base: Floats, horizon: float, tolerance: float = TUBE
+    tree: KinematicTree, wanted: Wanted, motion: JointMotion, base: Floats, tolerance: float = TUBE
 ) -> LinkPlans:
-    """Return the plans of bodies that links carry while joints (J, 2) keep their rates.
+    """Return the plans of bodies that links carry, between the ends of the motion of the joints.
 
-    base: numbers (NUMBERS,) of the motion of the base link. Raises InputError beyond MOST_WORK.
+    base: numbers (NUMBERS,) of the motion of the base link from time 0 on. Raises InputError for too long a motion.
     """
     v, w = (float(np.linalg.norm(base[a:b])) for a, b in ((LINEAR, ANGULAR), (ANGULAR, ACCELERATION)))
     is_screw = base[COURSE] == ARC or v == 0.0 or w == 0.0
     bound = BaseBound(v, w, 0.0 if v == w == 0.0 else 1.0 if is_screw else 2.0)
-    spans = constant_rates(tree, joints, horizon, tolerance, w)
-    if (work := len(spans.times) * len(tree.links)) > MOST_WORK:
-        raise InputError(f"expected at most {MOST_WORK} poses of links for one plan, got {work}: too many joints stop")
+    spans = joint_spans(motion, tree, tolerance, w)
     moves = carried(np.tile(base, (len(spans.times), 1)), spans.times)[:, :ACCELERATION]
     return LinkPlans(spans.times, wanted.rows, link_pieces(tree, wanted, spans, moves, bound, tolerance))
 
@@ -85,50 +81,37 @@ def load_link_plans() -> None:
     tree = kinematic_tree(parse_urdf(text, "warm-up"))
     base = straight_motions(np.eye(1, ACCELERATION, 6))
     set_courses(base, False, True, False)
-    link_plans(tree, Wanted(np.array([2]), np.ones(1)), np.ones((2, 2)), base[0], 1.0)
+    motion = JointMotion(np.array([0.0, 1.0]), np.ones((1, 2, 2)))
+    link_plans(tree, Wanted(np.array([2]), np.ones(1)), motion, base[0])
 
 
 def planned_links(
-    tree: KinematicTree, wanted: Wanted, joints: Floats, base: Any, horizon: Any, tolerance: Any, then: Then
+    tree: KinematicTree, wanted: Wanted, motion: JointMotion, base: Any, tolerance: Any, then: Then
 ) -> list[Trajectory]:
     """Return the plans of links as trajectories, see `Robot.motions`. Raises InputError, PoseError."""
-    seconds = checked_number(horizon, "horizon", "s", least=0.0, most=LONGEST, above=True)
     width = checked_number(tolerance, "tolerance", "m", least=0.0, above=True)
-    plans, made = link_plans(tree, wanted, joints, _base_numbers(base), seconds, width), []
+    plans, made = link_plans(tree, wanted, motion, _base_numbers(base), width), []
     for b, tube in enumerate(plans.pieces.tubes.tolist()):
         if not tube <= LARGEST_INPUT:
+            seconds = float(motion.edges[-1] - motion.edges[0])
             raise InputError(f"expected rates at which a link can be followed for {seconds:g} s, got faster ones")
         made.append(Trajectory(*plans.points(b), between="arc", then=then, tube=tube))
     return made
 
 
+def checked_horizon(horizon: Any) -> float:
+    """Return how far ahead the motion of a robot is stated (s). Raises InputError."""
+    return checked_number(horizon, "horizon", "s", least=0.0, most=LONGEST, above=True)
+
+
 def joint_values(names: Sequence[str], q: Any, qd: Any) -> Floats:
     """Return positions and rates (J, 2) of joints. Raises InputError."""
-    position, rate = (_by_joint(each, names, what) for each, what in ((q, "q"), (qd, "qd")))
+    position, rate = numbers_by_joint(names, q, "q"), numbers_by_joint(names, qd, "qd")
     fast = np.flatnonzero(np.abs(rate) > FASTEST)
     if len(fast):
         j = int(fast[0])
         raise InputError(f"qd: expected at most {FASTEST:g} rad/s or m/s, got {rate[j]:g} for {names[j]}")
     return np.stack([position, rate], axis=1)
-
-
-def _by_joint(given: Any, names: Sequence[str], what: str) -> Floats:
-    if isinstance(given, Mapping):
-        unknown, missing = given.keys() - set(names), [name for name in names if name not in given]
-        if unknown or missing:
-            found = f"unknown: {', '.join(sorted(map(repr, unknown)))}" if unknown else f"none for {', '.join(missing)}"
-            raise InputError(f"{what}: expected a number for each of {', '.join(names)}, got {found:.300}")
-        given = [given[name] for name in names]
-    numbers = as_numbers(given, what, f"{len(names)} numbers")
-    if numbers.shape != (len(names),):
-        raise InputError(
-            f"{what}: expected shape ({len(names)},), one for each of {', '.join(names)}, got {numbers.shape}"
-        )
-    bad = np.flatnonzero(~(np.abs(numbers) <= LARGEST_INPUT))
-    if len(bad):
-        j = int(bad[0])
-        raise InputError(f"{what}: expected finite numbers up to {LARGEST_INPUT:g}, got {numbers[j]:g} for {names[j]}")
-    return numbers
 
 
 def _base_numbers(base: Any) -> Floats:

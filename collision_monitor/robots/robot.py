@@ -13,12 +13,16 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.checks.numbers import as_numbers
 from collision_monitor.errors import InputError
 from collision_monitor.motion.trajectory import Then, Trajectory
+from collision_monitor.robots.constant_rates import constant_rates
+from collision_monitor.robots.joint_motion import JointMotion
+from collision_monitor.robots.joint_trajectory import joint_trajectory
 from collision_monitor.robots.kinematic_tree import KinematicTree, kinematic_tree
 from collision_monitor.robots.link_motions import link_motions
 from collision_monitor.robots.link_pieces import Wanted
-from collision_monitor.robots.link_plans import TUBE, joint_values, planned_links, radius_of
+from collision_monitor.robots.link_plans import TUBE, checked_horizon, joint_values, planned_links, radius_of
 from collision_monitor.robots.link_shapes import Meshes, link_shapes
 from collision_monitor.robots.mesh_location import FileLocator
 from collision_monitor.robots.srdf import Pair, disabled_pairs
@@ -174,8 +178,59 @@ class Robot:
         >>> moves["hand"].at(1.0).position.round(3)
         array([0.57 , 0.311, 0.504])
         """
-        joints, wanted = joint_values(self.joints, q, qd), Wanted(self.rows, self.radii)
-        made = planned_links(self.tree, wanted, joints, base, horizon, tolerance, then)
+        motion = constant_rates(self.tree, joint_values(self.joints, q, qd), checked_horizon(horizon))
+        return self._plans(motion, base, tolerance, then)
+
+    def follow(
+        self,
+        times: Any,
+        positions: Any,
+        velocities: Any = None,
+        accelerations: Any = None,
+        *,
+        joints: Sequence[str] | None = None,
+        q: Any = None,
+        qd: Any = None,
+        base: Any = (0.0, 0.0, 0.0),
+        tolerance: float = TUBE,
+        then: Then = "rest",
+    ) -> dict[str, Trajectory]:
+        """Return the plan of each link with shapes, by its name, along a joint trajectory.
+
+        times (N,): s from now on, rising. positions (N, K): rad or m of the joints named by `joints`, by default all,
+        in the order of `joints`. velocities, accelerations (N, K): rad/s, rad/s^2 or m/s, m/s^2. Between two points the
+        joints move on lines with positions alone, on cubic polynomials with velocities too, and on quintic ones with
+        accelerations too, as with ros2_control's joint_trajectory_controller. q, qd: positions and rates of all joints
+        now, as for `motions`: the trajectory begins there if its first point is in the future, and joints without a
+        trajectory rest there. Without q all joints need a trajectory, and the links rest at its first point before it.
+        base, tolerance: as for `motions`. then: what holds after the last point. Raises InputError and PoseError.
+
+        >>> arm = Robot("examples/arm/arm.urdf")
+        >>> plan = arm.follow([0, 2], [[0, 0.2, 0, -2, 0, 2.2, 0.8, 0.03], [1, 0.2, 0, -2, 0, 2.2, 0.8, 0.03]])
+        >>> plan["hand"].at(1.0).position.round(3)
+        array([0.518, 0.283, 0.36 ])
+        """
+        names = self.joints if joints is None else joints
+        if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+            raise InputError(f"joints: expected names of joints, got {names!r:.200}")
+        start = self._start(names, positions, q, qd)
+        motion = joint_trajectory(self.tree, names, times, (positions, velocities, accelerations), start, q is not None)
+        return self._plans(motion, base, tolerance, then)
+
+    def _start(self, names: Sequence[str], positions: Any, q: Any, qd: Any) -> Floats:
+        """Positions and rates (J, 2) of the joints now; without q those of the first point."""
+        if q is not None:
+            return joint_values(self.joints, q, np.zeros(len(self.joints)) if qd is None else qd)
+        if missing := [name for name in self.joints if name not in names]:
+            raise InputError(f"q: expected the positions of all joints now, got no plan for {', '.join(missing)}")
+        rows = as_numbers(positions, "positions", "numbers (N, K)")
+        if rows.ndim != 2 or not len(rows) or rows.shape[1] != len(names):
+            raise InputError(f"positions: expected shape (N, {len(names)}), got {rows.shape}")
+        first = dict(zip(names, rows[0].tolist(), strict=True))
+        return joint_values(self.joints, first, np.zeros(len(self.joints)))
+
+    def _plans(self, motion: JointMotion, base: Any, tolerance: Any, then: Then) -> dict[str, Trajectory]:
+        made = planned_links(self.tree, Wanted(self.rows, self.radii), motion, base, tolerance, then)
         return dict(zip(self.links, made, strict=True))
 
     @cached_property

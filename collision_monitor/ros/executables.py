@@ -28,6 +28,11 @@ def guard(args: Sequence[str] | None = None) -> int:
     return _run(_guard, args, _guard_help)
 
 
+def gate(args: Sequence[str] | None = None) -> int:
+    """Run the gate until SIGINT or SIGTERM, or print its help. `args`: as sys.argv. Returns the exit code."""
+    return _run(_gate, args, _gate_help)
+
+
 _NODE_HELP: Final = """\
 usage: {name} [--help] [--ros-args -p NAME:=VALUE ... -r FROM:=TO ...]
 
@@ -40,6 +45,12 @@ def _guard_help() -> str:
     from collision_monitor.ros.guard.guard_options import guard_help
 
     return guard_help()
+
+
+def _gate_help() -> str:
+    from collision_monitor.ros.gate.gate_options import gate_help
+
+    return gate_help()
 
 
 def wants_help(arguments: Sequence[str]) -> bool:
@@ -81,6 +92,16 @@ def _guard(stop: StopRequest) -> None:
     from collision_monitor.ros.guard.guard_node import GuardNode
 
     node = GuardNode()
+    try:
+        spin(node, stop)
+    finally:
+        node.close()
+
+
+def _gate(stop: StopRequest) -> None:
+    from collision_monitor.ros.gate.gate_node import GateNode
+
+    node = GateNode()
     try:
         spin(node, stop)
     finally:

@@ -178,7 +178,7 @@ def correct_exported_paths(log: IO[str]) -> None:
 
 def _messages_inputs(ros: machine.RosInstall | None) -> str:
     sources = ROOT / MESSAGES
-    messages = sorted((sources / "msg").glob("*.msg"))
+    messages = sorted([*(sources / "msg").glob("*.msg"), *(sources / "srv").glob("*.srv")])
     generators = [] if ros else ros_wheels()
     return _digest(*generators, files=[sources / "CMakeLists.txt", sources / "package.xml", *messages])
 
@@ -205,7 +205,7 @@ def _build_messages(ros: machine.RosInstall | None, log: IO[str]) -> None:
 # package -------------------------------------------------------------------------------------------------------------
 
 
-EXECUTABLES = ("monitor", "guard", "world", "replay", "collision-monitor")
+EXECUTABLES = ("monitor", "guard", "gate", "world", "replay", "collision-monitor")
 
 
 def ros_files() -> dict[Path, Path]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
+RADIUS = 0.2
 KINDS = ("revolute", "continuous", "prismatic", "fixed")
 
 
@@ -38,7 +39,7 @@ class ChainJoint:
             <child link="link_{k + 1}"/><origin xyz="{xyz}" rpy="{rpy}"/><axis xyz="{axis}"/>{limit}{mimic}</joint>"""
 
 
-def urdf_of(joints: list[ChainJoint], radius: float = 0.2) -> str:
+def urdf_of(joints: list[ChainJoint], radius: float = RADIUS) -> str:
     """A robot whose links are balls about their origins."""
     ball = f'<collision><geometry><sphere radius="{radius}"/></geometry></collision>'
     links = "".join(f'<link name="link_{k}">{ball}</link>' for k in range(len(joints) + 1))
@@ -86,7 +87,15 @@ def moved(q: float, rate: float, limits: tuple[float, float], t: Array) -> Array
 def link_poses(
     joints: list[ChainJoint], q: dict[str, float], qd: dict[str, float], t: Array, base: tuple[Array, Rotation]
 ) -> list[tuple[Array, Rotation]]:
-    """Positions (n, 3) and rotations of all links at times (n,). base: those of the base link."""
+    """Positions (n, 3) and rotations of all links at times (n,), at constant rates. base: those of the base link."""
+    limits = {f"joint_{k}": each.limits for k, each in enumerate(joints)}
+    return link_poses_at(joints, {name: moved(q[name], qd[name], limits[name], t) for name in q}, base)
+
+
+def link_poses_at(
+    joints: list[ChainJoint], q: dict[str, Array], base: tuple[Array, Rotation]
+) -> list[tuple[Array, Rotation]]:  # fmt: skip
+    """Positions (n, 3) and rotations of all links where the joints are at positions (n,)."""
     poses: list[Any] = [base]
     for k, joint in enumerate(joints):
         position, rotation = poses[joint.parent]
@@ -94,11 +103,33 @@ def link_poses(
         position = position + rotation.apply(joint.xyz)
         if joint.kind != "fixed":
             leader, multiplier, offset = joint.follows or (k, 1.0, 0.0)
-            name = f"joint_{leader}"
-            value = multiplier * moved(q[name], qd[name], joints[leader].limits, t) + offset
+            value = multiplier * q[f"joint_{leader}"] + offset
             if joint.kind == "prismatic":
                 position = position + rotation_0.apply(value[:, None] * joint.axis)
             else:
                 rotation_0 = rotation_0 * Rotation.from_rotvec(value[:, None] * joint.axis)
         poses.append((position, rotation_0))
     return poses
+
+
+def stands(t: Array) -> tuple[Array, Rotation]:
+    """A base at rest at the origin at times (n,)."""
+    return np.zeros((len(t), 3)), Rotation.from_quat(np.tile([0.0, 0, 0, 1], (len(t), 1)))
+
+
+def excess(plan: Any, poses: tuple[Array, Rotation], t: Array, points: Array) -> Array:
+    """By how much (m) points of a link are farther off its plan at times than its tube says (n,)."""
+    rows = plan.rows(t)
+    position, rotation = poses
+    off = np.zeros(len(t))
+    planned = Rotation.from_quat(rows[:, 3:7])
+    for point in points:
+        there = position + rotation.apply(point) - rows[:, :3] - planned.apply(point)
+        off = np.maximum(off, np.linalg.norm(there, axis=1))
+    return np.asarray(off - plan.tubes[plan.piece(t)])
+
+
+def sphere_points(rng: np.random.Generator, count: int = 8) -> Array:
+    """Points (count, 3) on the balls of `urdf_of`."""
+    points = rng.normal(size=(count, 3))
+    return np.asarray(RADIUS * points / np.linalg.norm(points, axis=1, keepdims=True))

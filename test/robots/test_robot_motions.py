@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from robot_chains import ChainJoint, link_poses, random_chain, urdf_of
+from robot_chains import RADIUS, ChainJoint, excess, link_poses, random_chain, sphere_points, stands, urdf_of
 from scipy.spatial.transform import Rotation
 
 import collision_monitor as cm
@@ -18,34 +18,12 @@ from collision_monitor.robots.robot import Description
 
 Array = NDArray[np.float64]
 ARM = Path(__file__).parents[2] / "examples/arm/arm.urdf"
-RADIUS = 0.2
 MOVING = [0.5, -0.4, 0.3, 0.6, -0.7, 0.6, 0.9, 0.01]
 PLACE = [0.0, 0.2, 0.0, -2.0, 0.0, 2.2, 0.785, 0.01]
 
 
 def robot_of(joints: list[ChainJoint]) -> cm.Robot:
     return cm.Robot(Description(urdf_of(joints, RADIUS), "r.urdf"))
-
-
-def stands(t: Array) -> tuple[Array, Rotation]:
-    return np.zeros((len(t), 3)), Rotation.from_quat(np.tile([0.0, 0, 0, 1], (len(t), 1)))
-
-
-def excess(plan: cm.Trajectory, poses: tuple[Array, Rotation], t: Array, points: Array) -> Array:
-    """By how much (m) points of a link are farther off its plan at times than its tube says (n,)."""
-    rows = plan.rows(t)
-    position, rotation = poses
-    off = np.zeros(len(t))
-    planned = Rotation.from_quat(rows[:, 3:7])
-    for point in points:
-        there = position + rotation.apply(point) - rows[:, :3] - planned.apply(point)
-        off = np.maximum(off, np.linalg.norm(there, axis=1))
-    return np.asarray(off - plan.tubes[plan.piece(t)])
-
-
-def sphere_points(rng: np.random.Generator, count: int = 8) -> Array:
-    points = rng.normal(size=(count, 3))
-    return np.asarray(RADIUS * points / np.linalg.norm(points, axis=1, keepdims=True))
 
 
 @pytest.mark.parametrize("seed", range(10))

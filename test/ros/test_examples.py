@@ -15,6 +15,7 @@ PROMISES = {
     "robot_from_odometry.py": r"robot meets wall in \d\.\d\d to \d\.\d\d s",
     "robot_on_path.py": r"robot meets crate in 1\.\d\d to \d\.\d\d s",
     "tracked_objects.py": r"car meets traffic_pedestrian_1 in \d\.\d\d to \d\.\d\d s",
+    "arm/gate.py": r"(?s)gate: stops: arm/\w+ and post: .* s of the plan.*refused a plan: arm/\w+ and post",
     "brake_before_impact.py": r"stopped 0\.\d\d m before the wall at",
 }
 

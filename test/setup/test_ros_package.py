@@ -20,7 +20,7 @@ import stages
 from collision_monitor._version import VERSION
 
 ROOT = Path(__file__).parents[2]
-EXECUTABLES = {"monitor", "guard", "world", "replay", "collision-monitor"}
+EXECUTABLES = {"monitor", "guard", "gate", "world", "replay", "collision-monitor"}
 COLCON = "import sys; from colcon_core.command import main; sys.exit(main())"
 
 PREFIXES = ":".join(filter(None, (sys.prefix, os.environ.get("AMENT_PREFIX_PATH"))))
@@ -66,7 +66,12 @@ def test_the_package_is_in_the_ament_index(install: Path) -> None:
     prefix, share = map(Path, answer.stdout.splitlines())
     assert prefix == install / "collision_monitor"
     installed = {str(path.relative_to(share)) for folder in ("config", "launch") for path in (share / folder).iterdir()}
-    assert {"config/monitor.yaml", "launch/monitor.launch.py", "launch/demo.launch.py"} <= installed
+    assert {
+        "config/monitor.yaml",
+        "launch/monitor.launch.py",
+        "launch/demo.launch.py",
+        "launch/gate.launch.py",
+    } <= installed
     assert (share / "package.xml").is_file()
 
 
@@ -189,8 +194,9 @@ def test_versions_agree() -> None:
 
 
 def test_every_message_is_built() -> None:
-    listed = set(re.findall(r"msg/\w+\.msg", (ROOT / "collision_monitor_msgs" / "CMakeLists.txt").read_text()))
-    assert listed == {f"msg/{path.name}" for path in (ROOT / "collision_monitor_msgs" / "msg").glob("*.msg")}
+    folder = ROOT / "collision_monitor_msgs"
+    listed = set(re.findall(r"(?:msg|srv)/\w+\.(?:msg|srv)", (folder / "CMakeLists.txt").read_text()))
+    assert listed == {f"{path.parent.name}/{path.name}" for kind in ("msg", "srv") for path in folder.glob(f"{kind}/*")}
 
 
 def test_what_is_imported_is_declared() -> None:

@@ -80,8 +80,9 @@ def guard_help() -> str:
     """Return the text of `guard --help`."""
     rows = [("robot", "", ROBOT), ("base", "", BASE), ("monitor", NODE, MONITOR), ("stamped", "false", STAMPED)]
     rows += [(each.name, f"{each.default:g} {each.unit}".strip(), each.text) for each in NUMBERS]
-    return _HELP.format(parameters="\n".join(_row(*each) for each in rows))
+    return _HELP.format(parameters="\n".join(parameter_row(*each) for each in rows))
 
 
-def _row(name: str, default: str, text: str) -> str:
+def parameter_row(name: str, default: str, text: str) -> str:
+    """Return the line of a parameter in a help text."""
     return f"  {name:<17} {text}{f' Default: {default}.' if default else ''}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -31,13 +32,22 @@ class GuardParameters:
 def read_guard_parameters(node: Node) -> GuardParameters:
     """Read, check and declare the parameters. Raises InputError."""
     reader = ParameterReader(node, NAMES)
+    patterns, base = read_robot(reader)
+    monitor = reader.read("monitor", NODE, MONITOR).strip("/")
+    stamped = reader.read("stamped", False, STAMPED)
+    numbers = read_numbers(reader, NUMBERS)
+    limits = GuardLimits(*numbers[:4])
+    braking = Braking(*numbers[4:])
+    braking = replace(braking, reaction=max(braking.reaction, limits.max_age))  # for so long it relies on one answer
+    return GuardParameters(patterns, base, monitor, stamped, limits, braking)
+
+
+def read_robot(reader: ParameterReader) -> tuple[tuple[str, ...], str]:
+    """Read and declare `robot` and `base`: the names of the objects, and that of the frame. Raises InputError."""
     patterns = _names(reader.given("robot"))
     robot = ",".join(patterns)
     reader.declare("robot", robot, ParameterDescriptor(description=ROBOT, read_only=True))
     base = reader.read("base", "", BASE) or (patterns[0] if patterns else "")
-    monitor = reader.read("monitor", NODE, MONITOR).strip("/")
-    stamped = reader.read("stamped", False, STAMPED)
-    values = {each.name: reader.read(each.name, each.default, _described(each)) for each in NUMBERS}
     if not patterns:
         raise InputError("parameter robot: expected the name of the robot's object, got an empty text")
     if any(letter in base for letter in "*?["):
@@ -45,15 +55,16 @@ def read_guard_parameters(node: Node) -> GuardParameters:
             f"parameter base: expected the name of the object whose frame the commands have, got {base!r}, which has a "
             "wildcard: name it with -p base:=NAME"
         )
-    for each in NUMBERS:
-        if not each.least <= values[each.name] <= each.most:
-            raise InputError(
-                f"parameter {each.name}: expected {each.least:g} to {each.most:g}, got {values[each.name]:g}"
-            )
-    limits = GuardLimits(*(values[each.name] for each in NUMBERS[:4]))
-    braking = Braking(*(values[each.name] for each in NUMBERS[4:]))
-    braking = replace(braking, reaction=max(braking.reaction, limits.max_age))  # for so long it relies on one answer
-    return GuardParameters(patterns, base, monitor, stamped, limits, braking)
+    return patterns, base
+
+
+def read_numbers(reader: ParameterReader, table: Sequence[NumberParameter]) -> list[float]:
+    """Read and declare the numbers of a table. Raises InputError for one out of range."""
+    values = [reader.read(each.name, each.default, _described(each)) for each in table]
+    for each, value in zip(table, values, strict=True):
+        if not each.least <= value <= each.most:
+            raise InputError(f"parameter {each.name}: expected {each.least:g} to {each.most:g}, got {value:g}")
+    return values
 
 
 def _names(given: Any) -> tuple[str, ...]:

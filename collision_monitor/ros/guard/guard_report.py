@@ -66,10 +66,13 @@ class Decision:
 
 
 class GuardReport:
-    """Notices what changes, logs it, and reports on `/diagnostics`. text: of the last decision that was news."""
+    """Notices what changes, logs it, and reports on `/diagnostics`. text: of the last decision that was news.
 
-    def __init__(self, logger: Any, robot: GuardedObjects) -> None:
-        self._logger, self._robot = logger, robot
+    task: name of the report.
+    """
+
+    def __init__(self, logger: Any, robot: GuardedObjects, task: str = "guard") -> None:
+        self._logger, self._robot, self._task = logger, robot, task
         self._last: Decision | None = None
         self._key: tuple[Any, ...] = ()
         self._logged: dict[str, float] = {}
@@ -115,7 +118,7 @@ class GuardReport:
         """Return the report of the guard: an ERROR while it cannot guard."""
         decision = self._last
         if decision is None:
-            return [Report("guard", DiagnosticLevel.ERROR, "no look at the monitor yet", {})]
+            return [Report(self._task, DiagnosticLevel.ERROR, "no look at the monitor yet", {})]
         level = DiagnosticLevel.OK
         if decision.fault is not None:
             level = DiagnosticLevel.ERROR
@@ -128,4 +131,4 @@ class GuardReport:
             "rule": decision.verdict.rule,
             "objects": self._objects(),
         }
-        return [Report("guard", level, text, values)]
+        return [Report(self._task, level, text, values)]

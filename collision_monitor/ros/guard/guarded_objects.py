@@ -51,7 +51,8 @@ class GuardedObjects:
         return [each for each in self.patterns if not any(matches(each, name) for name in names)]
 
     def describe(self, message: ObjectDescriptionArray) -> None:
-        """Take over descriptions; a snapshot replaces all."""
+        """Take over descriptions. A snapshot, which comes with every new subscriber, replaces all; places stay."""
+        states, names = dict(self.states), dict(self.names)
         if message.snapshot:
             for known in (self.names, self.states, self._others):
                 known.clear()
@@ -65,6 +66,8 @@ class GuardedObjects:
             else:
                 self._others[each.object_id] = each.name
                 self.states.pop(each.object_id, None)
+        if message.snapshot:
+            self.states = {each: it for each, it in states.items() if self.names.get(each) == names[each]}
 
     def move(self, message: ObjectStateArray, arrived: float) -> None:
         """Take over the states of the robot's objects. A state that is not finite, or not newer, is left out."""

@@ -16,7 +16,7 @@ from collision_monitor.codec import AlertLevel, CollisionAlert, CollisionAlertAr
 from collision_monitor.monitor.state.timeline import NANOSECOND
 from collision_monitor.ros.durations import spoken
 from collision_monitor.ros.guard.guard_limits import GuardLimits
-from collision_monitor.ros.guard.guarded_objects import GuardedObjects, LastState
+from collision_monitor.ros.guard.guarded_objects import GuardedObjects
 from collision_monitor.ros.guard.speed_limit import Braking, NearPair
 
 HEARD: Final = 1.2
@@ -44,7 +44,7 @@ class MonitorAnswers:
     """The last answer of the monitor, and when which monitors were heard. monitor: name of its node."""
 
     def __init__(self, monitor: str, limits: GuardLimits) -> None:
-        self._monitor, self._limits = monitor, limits
+        self._monitor, self.limits = monitor, limits
         self.array: CollisionAlertArray | None = None
         self._heard: dict[int, float] = {}  # by number of the monitor: steady time of its last answer
         self._step: int | None = None
@@ -69,9 +69,9 @@ class MonitorAnswers:
             self._two(now),
             self._late(array, now),
             self._unnamed(robot),
-            self._lost(robot, now),
-            self._uncovered(array, robot),
-            self._missing(array, robot),
+            self.lost(robot, now),
+            self.uncovered(array, robot),
+            self.missing(array, robot),
         )
         return next((each for each in faults if each is not None), None)
 
@@ -79,15 +79,15 @@ class MonitorAnswers:
         if not array.step:
             return Fault("no step", f"no step of {self._monitor} yet: no states reach it")
         since = now.steady - self._stepped
-        if since > self._limits.max_age:
+        if since > self.limits.max_age:
             return Fault("no step", f"no step of {self._monitor} for {spoken(since)}")
         return self._age("answer", f"the answers of {self._monitor} are", array.stamp_ns, now)
 
     def _age(self, kind: str, words: str, stamp_ns: int, now: ClockReading) -> Fault | None:
         age = (now.stamp_ns - stamp_ns) * NANOSECOND
-        if age > self._limits.max_age:
+        if age > self.limits.max_age:
             return Fault(f"old {kind}", f"{words} {spoken(age)} old")
-        if age < -self._limits.ahead:
+        if age < -self.limits.ahead:
             return Fault(f"early {kind}", f"{words} {spoken(-age)} ahead of the guard's clock: another clock")
         return None
 
@@ -103,21 +103,22 @@ class MonitorAnswers:
             return None
         return Fault(f"no object {missing}", f"no object is named {', '.join(map(repr, missing[:NAMED]))}")
 
-    def _lost(self, robot: GuardedObjects, now: ClockReading) -> Fault | None:
-        for object_id, name in robot.names.items():
-            state = robot.states.get(object_id)
-            if state is None:
-                return Fault(f"no state {name}", f"no state of {name!r} so far")
-            if found := self._old_state(name, state, now):
-                return found
-        return None
+    def lost(self, robot: GuardedObjects, now: ClockReading) -> Fault | None:
+        """Return the first object of the robot whose state is missing or old; None if there is none."""
+        found = (self.state_fault(each, name, robot, now) for each, name in robot.names.items())
+        return next((each for each in found if each is not None), None)
 
-    def _old_state(self, name: str, state: LastState, now: ClockReading) -> Fault | None:
-        if now.steady - state.arrived > self._limits.max_age:
+    def state_fault(self, object_id: int, name: str, robot: GuardedObjects, now: ClockReading) -> Fault | None:
+        """Return why the state of an object of the robot cannot be relied on; None if it can."""
+        state = robot.states.get(object_id)
+        if state is None:
+            return Fault(f"no state {name}", f"no state of {name!r} so far")
+        if now.steady - state.arrived > self.limits.max_age:
             return Fault(f"no state {name}", f"no state of {name!r} for {spoken(now.steady - state.arrived)}")
         return self._age(f"state {name}", f"the states of {name!r} are", state.stamp_ns, now)
 
-    def _uncovered(self, array: CollisionAlertArray, robot: GuardedObjects) -> Fault | None:
+    def uncovered(self, array: CollisionAlertArray, robot: GuardedObjects) -> Fault | None:
+        """Return the objects of the robot that no rule covers; None if there are none."""
         covered = {int(each) for rule in array.coverage for each in rule.ids}
         bare = [name for object_id, name in robot.names.items() if object_id not in covered]
         if not bare:
@@ -128,12 +129,13 @@ class MonitorAnswers:
         names = ", ".join(map(repr, bare[:NAMED])) + (f" and {len(bare) - NAMED} more" if len(bare) > NAMED else "")
         return Fault(f"uncovered {bare}", f"no rule in force covers {names} now; the rules are {rules}")
 
-    def _missing(self, array: CollisionAlertArray, robot: GuardedObjects) -> Fault | None:
+    def missing(self, array: CollisionAlertArray, robot: GuardedObjects) -> Fault | None:
+        """Return the first object that is not monitored, and concerns the robot; None if there is none."""
         own = {k for k, rule in enumerate(array.coverage) if np.isin(rule.ids, list(robot.names)).any()}
         for each in array.unmonitored:
             age = (array.stamp_ns - each.since_ns) * NANOSECOND
             if each.is_silent:
-                is_due = each.name not in robot.names.values() and age > self._limits.obstacle
+                is_due = each.name not in robot.names.values() and age > self.limits.obstacle
                 if is_due and own.intersection(each.coverage):
                     return Fault(f"silent {each.name}", f"{each.name!r}: {each.reason} for {spoken(age)}")
             elif not each.name or any(may_name(pattern, each.name) for pattern in robot.patterns):

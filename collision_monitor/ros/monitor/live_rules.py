@@ -1,6 +1,6 @@
 """Rules of the alerts that change while the monitor runs, by the parameter `rules` or by a latched topic.
 
-    ros2 param set /object_monitor rules night.yaml
+ros2 param set /object_monitor rules night.yaml
 """
 
 from __future__ import annotations

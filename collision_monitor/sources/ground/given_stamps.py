@@ -12,8 +12,10 @@ from collision_monitor.sources.messages.marker_arrays import MarkerArrays
 def given_stamp(content: Any) -> int | None:
     """Return the stamp of a message (ns), 0 if it is left out; None for a message without a header.
 
-    That of markers is the first that is there.
+    That of markers is the first that is there. The one of a joint trajectory says when it starts, not as of when it is.
     """
+    if hasattr(content, "joint_names"):
+        return 0
     if isinstance(content, MarkerArrays):
         return next((each for each in content.stamps if each), 0) if content.stamps else None
     header = getattr(content, "header", None)

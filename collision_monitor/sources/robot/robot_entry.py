@@ -10,6 +10,7 @@ robots:
     base: {frame: base_link}                         # a frame of tf; without `base` the one with the base link's name
     # base: {odometry: /odom}                        # the pose of its child_frame_id, a link; or name it, `link: …`
     # base: {pose: [1, 0, 0.8]}                      # where it is bolted, in `frame` or else in the monitor's frame
+    plan: /arm_controller/joint_trajectory           # JointTrajectory, or MoveIt's DisplayTrajectory
     planning_scene: /monitored_planning_scene        # of MoveIt: its world, attached objects, padding, allowed pairs
     padding: 0.01
     model: convex_hull                               # what represents the links, as in ObjectDescription
@@ -33,8 +34,7 @@ from collision_monitor.sources.ground.yaml_table import known, number, pose, tab
 
 _KEYS: Final = (
     *("urdf", "urdf_topic", "srdf", "srdf_topic", "packages", "arguments", "joint_states", "base"),
-    "planning_scene",
-    *("padding", "group", "mask", "model", "allowed", "motion"),
+    *("planning_scene", "padding", "group", "mask", "model", "allowed", "motion", "plan"),
 )
 JOINTS, ARC = "joints", "arc"
 _BASE: Final = ("frame", "odometry", "link", "pose")
@@ -71,6 +71,7 @@ class RobotEntry:
     joint_states: str = ""
     base: BaseEntry = BaseEntry()
     planning_scene: str = ""
+    plan: str = ""
     padding: float = 0.0
     group: int = 1
     mask: int = 0
@@ -92,7 +93,7 @@ def read_robots(content: Any, mapping: Mapping) -> list[RobotEntry]:
 
 def _robot(name: str, content: dict[str, Any], mapping: Mapping) -> RobotEntry:
     given = {key: text(content.get(key, ""), f"{name}, {key}") for key in _KEYS[:4]}
-    topics = {key: text(content.get(key, ""), f"{name}, {key}") for key in ("joint_states", "planning_scene")}
+    topics = {key: text(content.get(key, ""), f"{name}, {key}") for key in ("joint_states", "planning_scene", "plan")}
     if bool(given["urdf"]) == bool(given["urdf_topic"]):
         raise InputError(f"{name}, urdf: expected `urdf: FILE` or `urdf_topic: TOPIC`, got both or none")
     if given["srdf"] and given["srdf_topic"]:

@@ -1,4 +1,7 @@
-"""Plans of the bodies that a robot's links carry, while its joints keep their rates: when they are due, and which."""
+"""Plans of the bodies that a robot's links carry: when they are due, and which.
+
+They go along a plan of the joints while there is one that the joints follow, else along the rates of the joints.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +13,13 @@ from numpy.typing import NDArray
 
 from collision_monitor.codec.trajectories import Between, ObjectTrajectory, Then
 from collision_monitor.motion.stated_motion import set_courses, straight_motions
-from collision_monitor.motion.trajectory import FASTEST
+from collision_monitor.motion.trajectory import FASTEST, Tolerance
+from collision_monitor.robots.constant_rates import constant_rates
 from collision_monitor.robots.kinematic_tree import KinematicTree, with_fixed_rows
 from collision_monitor.robots.link_pieces import Wanted
 from collision_monitor.robots.link_plans import TUBE, link_plans, radius_of
 from collision_monitor.sources.robot.carried_bodies import Body
+from collision_monitor.sources.robot.joint_plan import JointPlan
 from collision_monitor.tolerances import LARGEST_INPUT
 
 Floats = NDArray[np.float64]
@@ -27,6 +32,9 @@ CHANGED: Final = 0.5 * TUBE
 """m by which a point of the robot may be off its plans, within the horizon, until they are made anew."""
 
 NANOSECOND: Final = 1e-9
+
+OVER: Final = "over"
+"""Why a plan of the joints is not followed any more that has come to its end."""
 
 _NONE: Final = np.zeros((0, 7))
 _NO_TWISTS: Final = np.zeros((0, 6))
@@ -65,6 +73,7 @@ class RobotPlans:
         known = set() if before is None else {it for it, has in zip(before._ids, before._has_plan, strict=True) if has}
         self._has_plan: Mask = np.array([each in known for each in self._ids], np.bool_)
         self._made: tuple[int, float, Floats, Floats] | None = None  # when, how long, of which joints and base
+        self._planned: JointPlan | None = None  # what the last plans go along
         self._waits: bool = before is not None and before._waits
 
     def restart(self) -> None:
@@ -72,12 +81,13 @@ class RobotPlans:
         self._has_plan[:], self._made, self._waits = False, None, True
 
     def due(
-        self, now_ns: int, joints: Floats, base: Floats, usable: Mask, horizon: float
+        self, now_ns: int, joints: Floats, base: Floats, usable: Mask, horizon: float, planned: JointPlan | None = None
     ) -> list[ObjectTrajectory]:  # fmt: skip
         """Return the new plans from now on, and the ends of those that are not needed any more.
 
         joints (J, 2): positions and rates. base (13,): motion of the base link. usable (N,): bodies whose joints are
-        known. horizon (s): of the monitor. Raises InputError for a robot whose joints stop one after the other.
+        known. horizon (s): of the monitor. planned: what the joints follow; None: they keep their rates. Raises
+        InputError for a robot whose joints stop one after the other, and for a plan that is too long.
         """
         if self._waits:
             self._waits = False
@@ -85,33 +95,53 @@ class RobotPlans:
         usable = usable & np.isfinite(self._wanted.radii)
         if not self._reach * np.abs(joints[:, 1]).sum() < FASTEST or horizon <= 0.0:
             usable = np.zeros_like(usable)
-        if self._keeps(now_ns, joints, base, horizon) and not (self._has_plan & ~usable).any():
+        keeps = self._keeps(now_ns, joints, base, horizon) if planned is None else self._stays(base)
+        if keeps and planned is self._planned and not (self._has_plan & ~usable).any():
             return []
         which = np.flatnonzero(usable)
         wanted = Wanted(self._wanted.rows[which], self._wanted.radii[which])
         row = straight_motions(base[None])
         set_courses(row, False, True, False)
-        plans = link_plans(self._tree, wanted, joints, row[0], LONGER * horizon)
+        rates = constant_rates(self._tree, joints, LONGER * horizon) if planned is None else planned.at(now_ns)
+        plans = link_plans(self._tree, wanted, rates, row[0])
         found, has_plan = [], np.zeros_like(usable)
         for b, (k, tube) in enumerate(zip(which.tolist(), plans.pieces.tubes.tolist(), strict=True)):
-            if plans.pieces.counts[b] > 2 and tube <= LARGEST_INPUT:
-                times, poses = plans.points(b)
+            times, poses = plans.points(b)
+            if (len(times) > 2 or (planned is not None and (poses[0] != poses[1]).any())) and tube <= LARGEST_INPUT:
                 has_plan[k] = True
-                found.append(self._trajectory(k, times, poses, tube))
+                then = Then.GO_ON if planned is None else Then.REST
+                found.append(self._trajectory(k, times, poses, tube, then))
         ended = np.flatnonzero(self._has_plan & ~has_plan)
         self._has_plan, self._made = has_plan, (now_ns, LONGER * horizon, joints.copy(), base.copy())
+        self._planned = planned
         return [*(self._trajectory(k, np.zeros(0), _NONE, 0.0) for k in ended.tolist()), *found]
 
-    def _trajectory(self, k: int, times: Floats, poses: Floats, tube: float) -> ObjectTrajectory:
-        return ObjectTrajectory(times, poses, _NO_TWISTS, _DEFAULT, self._ids[k], Between.ARC, Then.GO_ON, tube)
+    def leaves(self, planned: JointPlan, now_ns: int, joints: Floats) -> str:
+        """Return why a plan of the joints (J, 2) is not followed any more; empty: it is."""
+        if planned.is_over(now_ns, Tolerance().time):
+            return OVER
+        off = planned.off(now_ns, joints, Tolerance())
+        if self._reach * float(off.sum()) <= Tolerance().along:
+            return ""
+        j = int(off.argmax())
+        return f"the joints left the plan: {self._tree.joints[j]} is {off[j]:.3f} rad or m off"
+
+    def _trajectory(
+        self, k: int, times: Floats, poses: Floats, tube: float, then: Then = Then.GO_ON
+    ) -> ObjectTrajectory:  # fmt: skip
+        return ObjectTrajectory(times, poses, _NO_TWISTS, _DEFAULT, self._ids[k], Between.ARC, then, tube)
+
+    def _stays(self, base: Floats) -> bool:
+        """Whether the base rests where it was for the last plans."""
+        return self._made is not None and not base[7:].any() and np.array_equal(base, self._made[3])
 
     def _keeps(self, now_ns: int, joints: Floats, base: Floats, horizon: float) -> bool:
         """Whether the last plans still say where the robot goes: it stands on a base at rest, and its rates stay."""
         if self._made is None:
             return False
-        made_ns, length, then, at = self._made
+        made_ns, length, then, _ = self._made
         age = (now_ns - made_ns) * NANOSECOND
-        if not 0.0 <= age <= length - horizon or base[7:].any() or not np.array_equal(base, at):
+        if not 0.0 <= age <= length - horizon or not self._stays(base):
             return False
         off = np.abs(joints[:, 0] - then[:, 0] - age * then[:, 1]) + horizon * np.abs(joints[:, 1] - then[:, 1])
         return bool(self._reach * off.sum() <= CHANGED)

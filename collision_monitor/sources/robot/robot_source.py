@@ -24,11 +24,12 @@ from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
 from collision_monitor.sources.robot.carried_bodies import Body, CarriedBodies
 from collision_monitor.sources.robot.collision_objects import pose_bytes, shape_digest
+from collision_monitor.sources.robot.joint_plan import DISPLAY_TRAJECTORY, JOINT_TRAJECTORY, JointPlan, joint_plan
 from collision_monitor.sources.robot.joint_table import JointTable
 from collision_monitor.sources.robot.link_rules import LinkRules, allowed_contacts
 from collision_monitor.sources.robot.robot_base import BaseMotion, FixedBase, FrameBase, at_links, robot_base
 from collision_monitor.sources.robot.robot_entry import JOINTS, RobotEntry
-from collision_monitor.sources.robot.robot_plans import RobotPlans
+from collision_monitor.sources.robot.robot_plans import OVER, RobotPlans
 
 Floats = NDArray[np.float64]
 
@@ -76,8 +77,14 @@ class RobotSource(Source):
         self._moving = CarriedBodies((), ())
         self._needs = np.zeros((0, 0), np.bool_)
         self._plans: RobotPlans | None = None
+        self._planned: JointPlan | None = None  # what the joints are to do
         self._unknown_joints: set[str] = set()
-        topics = {entry.joint_states: (JOINT_STATE,), entry.urdf_topic: (TEXT,), entry.srdf_topic: (TEXT,)}
+        topics: dict[str, tuple[str, ...]] = {
+            entry.joint_states: (JOINT_STATE,),
+            entry.urdf_topic: (TEXT,),
+            entry.srdf_topic: (TEXT,),
+            entry.plan: (JOINT_TRAJECTORY, DISPLAY_TRAJECTORY),
+        }
         self.topics: Table[str, tuple[str, ...]] = {
             topic: types for topic, types in {**topics, **self._base.topics}.items() if topic
         }
@@ -104,6 +111,8 @@ class RobotSource(Source):
         elif self.robot is None:
             text = f"a message of {topic} came before its URDF on {self._entry.urdf_topic}"
             scene.refuse(self.name, text if self._is_prepared else f"{text} was ready")
+        elif topic == self._entry.plan:
+            self._take_plan(content, stamp_ns, self.robot)
         elif topic in self._base.topics:
             self._base.take(content, stamp_ns, self.robot, scene)
         else:
@@ -130,6 +139,7 @@ class RobotSource(Source):
 
     def forget_plans(self) -> None:
         """See Source."""
+        self._planned = None
         if self._plans is not None:
             self._plans.restart()
 
@@ -165,6 +175,23 @@ class RobotSource(Source):
         if len(chosen):
             self._observe(chosen, base, poses, twists, speed_known, now_ns, scene)
             self._plan(base, values, known & speed_known, now_ns, scene)
+
+    def _take_plan(self, content: Any, stamp_ns: int, robot: Robot) -> None:
+        """Take a plan of the joints, in place of the one before. Raises InputError."""
+        fresh = self._joints.fresh.copy()
+        values, known, _ = self._joints.at(stamp_ns)
+        self._joints.fresh = fresh
+        self._planned = None
+        plan = joint_plan(content, robot.tree, values, stamp_ns)
+        lacking = [name for name, is_known in zip(robot.tree.joints, known, strict=True) if not is_known]
+        if plan is not None and lacking:
+            more = f" and {len(lacking) - _SHOWN} more" if len(lacking) > _SHOWN else ""
+            topic = self._entry.joint_states or "no topic: give `joint_states`"
+            raise InputError(
+                f"{self._entry.plan}: expected positions on {topic} before the plan, got none of "
+                f"{', '.join(lacking[:_SHOWN])}{more}"
+            )
+        self._planned = plan
 
     # -- for a planning scene
 
@@ -271,7 +298,7 @@ class RobotSource(Source):
             if link not in robot.links:
                 raise InputError(f"{self.name}, allowed: expected a link with shapes, got {link!r:.80}")
         if self.robot is None or self.robot.tree.joints != robot.tree.joints:
-            self._joints = JointTable(robot.tree, self._max_age)
+            self._joints, self._planned = JointTable(robot.tree, self._max_age), None
         self.robot = robot
         self._digests.clear()
         return robot
@@ -397,8 +424,13 @@ class RobotSource(Source):
         usable: NDArray[np.bool_] = np.asarray(~(self._needs & ~known).any(axis=1))
         if base.stddev.any() or not base.motion.twist_known or self._entry.motion != JOINTS:
             usable[:] = False
+        planned = self._planned
+        if planned is not None and (reason := self._plans.leaves(planned, now_ns, values)):
+            self._planned = planned = None
+            if reason != OVER:
+                scene.refuse(self.name, f"{self._entry.plan}: {reason}")
         with scene.guard(self.name, "plans"):
-            scene.follow(self._plans.due(now_ns, values, base.row, usable, scene.horizon), now_ns)
+            scene.follow(self._plans.due(now_ns, values, base.row, usable, scene.horizon, planned), now_ns)
 
     def _refuse_unknown(self, names: Any, scene: SourceScene) -> None:
         """Count each joint once that no robot of the file has."""

@@ -228,6 +228,13 @@ def test_a_snapshot_replaces_all_objects_and_a_removal_one() -> None:
     assert (own.base, own.names, own.states) == (None, {9: "six/a"}, {})
 
 
+def test_a_snapshot_for_a_new_subscriber_leaves_the_places() -> None:
+    own = robot()
+    objects = tuple(ObjectDescription(k, Sphere(0.1), name=name) for k, name in {**NAMES, 3: "six/other"}.items())
+    own.describe(ObjectDescriptionArray(0, "map", True, objects))
+    assert list(own.states) == [1, 2]  # 3 is another object now
+
+
 def test_an_unknown_velocity_counts_as_none() -> None:
     own = robot()
     own.move(states([1], T + 1, linear=(np.nan, 0, 0), angular=(0, 0, 0.5)), 0.0)

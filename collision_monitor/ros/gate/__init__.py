@@ -1,0 +1,1 @@
+"""The gate between a planner and a controller."""
