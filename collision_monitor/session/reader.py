@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, NamedTuple
@@ -24,6 +25,7 @@ from collision_monitor.codec import (
     decode_states,
     decode_trajectories,
 )
+from collision_monitor.codec.older_messages import lacks_data, with_data
 from collision_monitor.errors import InputError, MessageError, ProfileError, SessionError
 from collision_monitor.pipeline.settings_event import RULES
 from collision_monitor.session.mcap.layout import (
@@ -193,17 +195,24 @@ class _RecordedFile:
         self.damage = []
         schemas: dict[int, str] = {}
         channels: dict[int, tuple[str, str]] = {}  # topic and type
+        old_schemas, older = set[int](), set[int]()  # and channels, whose messages lack a field of today
         inputs: dict[str, str] = {}
         repeated = 0 if begin else self.repeated  # repeated messages come before the first snapshot
         for record in self.records.read(begin):
             if isinstance(record, Message):
                 if record.channel_id in channels:
                     number, sequence, log_time, publish_time, data = record
+                    if number in older:
+                        data = _renewed(data)
                     yield Recorded(*channels[number], data, sequence, log_time, publish_time, repeated > 0)
                     repeated -= 1
             elif isinstance(record, Schema):
                 schemas[record.id] = record.name
+                if _SHORT_NAMES.get(record.name) == "ObjectDescriptionArray" and lacks_data(record.data):
+                    old_schemas.add(record.id)
             elif isinstance(record, Channel):
+                if record.schema_id in old_schemas:
+                    older.add(record.id)
                 self._check(record, schemas, inputs)
                 name = schemas.get(record.schema_id, "")
                 channels[record.id] = record.topic, _SHORT_NAMES.get(name, name)
@@ -263,6 +272,13 @@ class _RecordedFile:
                 f"{self.records.path}: expected the inputs of one monitor, got {inputs[name]} and {channel.topic}; "
                 "take one out with `collision-monitor import --node NAME`"
             )
+
+
+def _renewed(data: bytes) -> bytes:
+    """Return a message of descriptions with the field that it lacks; one that cannot be read as it is."""
+    with suppress(MessageError):
+        return with_data(data)
+    return data
 
 
 def _number(text: str | None) -> int:
