@@ -8,20 +8,20 @@ from typing import Any, Final, Self, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from collision_monitor.checks.numbers import checked_array, checked_number
+from collision_monitor.checks.numbers import checked_number
 from collision_monitor.errors import InputError, Refusal
 from collision_monitor.monitor.answers import mark_overtaken, step_status
 from collision_monitor.monitor.budget import PairBudget
 from collision_monitor.monitor.crowding import leave_out_crowds
 from collision_monitor.monitor.event_list import NO_EVENTS, Events, both
-from collision_monitor.monitor.intake import Observation, checked_nanoseconds
-from collision_monitor.monitor.plans import ENDED
+from collision_monitor.monitor.given_plan import checked_plan
+from collision_monitor.monitor.intake import Observation
 from collision_monitor.monitor.result import StepResult
 from collision_monitor.monitor.stages import Stages
 from collision_monitor.monitor.state.object_names import ids_named
 from collision_monitor.monitor.state.snapshot import Snapshot, restore_stages
 from collision_monitor.monitor.state.timeline import Progress
-from collision_monitor.monitor.step_context import KernelSettings, StepContext
+from collision_monitor.monitor.step_context import StepContext
 from collision_monitor.motion.trajectory import Tolerance, Trajectory
 from collision_monitor.objects.chosen_model import chosen_model, model_within_error
 from collision_monitor.objects.description import ALL_GROUPS, ObjectDescription
@@ -63,36 +63,6 @@ class Monitor(Stages):
         """The profile, the objects and the last step."""
         last = f"step {self.last.step} at {self.last.stamp_ns} ns" if self.last is not None else "no step yet"
         return f"Monitor({self.profile.name!r}, {len(self.ids)} objects, {last})"
-
-    # ------------------------------------------------------------------ settings
-
-    @property
-    def profile(self) -> Profile:
-        """The settings of the next step. They can be set at any time, to a Profile or to its name (`Profile.switched`).
-
-        Contacts persist. If a setting that predictions depend on changes, the next step predicts all objects anew.
-        """
-        return self._profile
-
-    @profile.setter
-    def profile(self, profile: str | Profile) -> None:
-        new = profile if isinstance(profile, Profile) else self._profile.switched(profile)
-        changed = self._profile.differences(new).keys()
-        self._profile, self._settings = new, KernelSettings.of(new)
-        if Profile.changes_predictions(changed):
-            self._roster.renew_all()
-        if changed & {"horizon", "horizon_by_name"}:
-            self._roster.bodies.slack[:] = 0.0  # its limits are multiples of the horizon
-        if "contact_details" in changed:
-            self._active_pairs.forget_answers()
-        if "threads" in changed:
-            self._first_impacts.use_threads(new.threads)
-        self._prepare_for_budget()
-
-    def _prepare_for_budget(self) -> None:
-        if self._time_critical.has_budget(self._profile):
-            step = StepContext(self._roster, self._profile, self._settings, 0.0, 0)
-            self._time_critical.prepare(step, self._first_impacts)
 
     # ------------------------------------------------------------------ objects
 
@@ -204,30 +174,9 @@ class Monitor(Stages):
         i = self._roster.slot(object_id)
         if plan is None:
             self._plans.drop(self._roster, np.array([i], np.int32))
-            return
-        zero = self._checked_plan(object_id, i, plan, stamp_ns)
-        numbers = checked_array(tolerance, "tolerance", least=0.0)
-        if numbers.shape != (len(Tolerance._fields),):
-            raise InputError(f"tolerance: expected a Tolerance of 4 numbers, got {tolerance!r:.100}")
-        flat = plan.flat() if self._roster.planar else plan
-        self._plans.follow(self._roster, i, flat, Tolerance(*numbers.tolist()), zero, stamp_ns)
-
-    def _checked_plan(self, object_id: int, i: int, plan: Trajectory, stamp_ns: int | None) -> float | None:
-        """Time 0 of a plan (s after the origin); None: there is no origin yet. Raises InputError, see `follow`."""
-        name = f"object {object_id}"
-        if not isinstance(plan, Trajectory):
-            raise InputError(f"{name}: expected a Trajectory or None, got {type(plan).__name__}")
-        if self._roster.bodies.static[i]:
-            raise InputError(f"{name}: expected an object that moves, got a static one")
-        if plan.then == "unknown":
-            raise InputError(f"{name}: expected a plan that says what comes after its end, 'rest' or 'go on'")
-        stamp = None if stamp_ns is None else checked_nanoseconds(stamp_ns, "stamp_ns")
-        if not self._timeline.has_begun:
-            return None
-        zero = self._timeline.now if stamp is None else self._timeline.seconds(stamp)
-        if zero + plan.times[-1] < self._timeline.now:
-            raise InputError(ENDED.format(id=object_id, late=self._timeline.now - zero - plan.times[-1]))
-        return zero
+        else:
+            given = checked_plan(self._roster, self._timeline, object_id, plan, stamp_ns, tolerance)
+            self._plans.follow(self._roster, i, *given, stamp_ns)
 
     def refuse(self, reason: Refusal, text: str, count: int = 1) -> None:
         """Count refused inputs, also those that the caller refuses."""

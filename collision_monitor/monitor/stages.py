@@ -21,7 +21,7 @@ from collision_monitor.monitor.state.object_names import ids_named
 from collision_monitor.monitor.state.roster import Roster
 from collision_monitor.monitor.state.snapshot import Snapshot, Stage, save_stages
 from collision_monitor.monitor.state.timeline import Timeline
-from collision_monitor.monitor.step_context import KernelSettings
+from collision_monitor.monitor.step_context import KernelSettings, StepContext
 from collision_monitor.monitor.time_critical import TimeCritical
 from collision_monitor.monitor.tracking import Tracking
 from collision_monitor.monitor.uncertain_predictions import UncertainPredictions
@@ -61,6 +61,36 @@ class Stages:
     def snapshot(self) -> Snapshot:
         """Copy all state that later answers depend on; each stage saves its own."""
         return save_stages(self.stages)
+
+    # ------------------------------------------------------------------ settings
+
+    @property
+    def profile(self) -> Profile:
+        """The settings of the next step. They can be set at any time, to a Profile or to its name (`Profile.switched`).
+
+        Contacts persist. If a setting that predictions depend on changes, the next step predicts all objects anew.
+        """
+        return self._profile
+
+    @profile.setter
+    def profile(self, profile: str | Profile) -> None:
+        new = profile if isinstance(profile, Profile) else self._profile.switched(profile)
+        changed = self._profile.differences(new).keys()
+        self._profile, self._settings = new, KernelSettings.of(new)
+        if Profile.changes_predictions(changed):
+            self._roster.renew_all()
+        if changed & {"horizon", "horizon_by_name"}:
+            self._roster.bodies.slack[:] = 0.0  # its limits are multiples of the horizon
+        if "contact_details" in changed:
+            self._active_pairs.forget_answers()
+        if "threads" in changed:
+            self._first_impacts.use_threads(new.threads)
+        self._prepare_for_budget()
+
+    def _prepare_for_budget(self) -> None:
+        if self._time_critical.has_budget(self._profile):
+            step = StepContext(self._roster, self._profile, self._settings, 0.0, 0)
+            self._time_critical.prepare(step, self._first_impacts)
 
     # ------------------------------------------------------------------ objects
 
