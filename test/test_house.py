@@ -15,6 +15,9 @@ MOST_MODULES: Final = 25
 MOST_LINES: Final = 450
 """Lines of a file."""
 
+MOST_LINES_OF_MONITOR: Final = 300
+"""Lines of the class Monitor: the door, and the list of the stages."""
+
 NAMESAKES: Final = {
     "Contacts": "the contacts of `cm.contacts`, and those of `cm.response`: a user meets them in different places",
     "add_parser": "one in each file of a command",
@@ -45,6 +48,10 @@ PACKAGE: Final = house.modules()
 
 def test_no_folder_holds_more_modules_than_one_looks_through() -> None:
     assert {folder: n for folder, n in house.modules_by_folder(PACKAGE).items() if n > MOST_MODULES} == {}
+
+
+def test_the_monitor_is_a_door() -> None:
+    assert house.class_lines(house.MONITOR, "Monitor") <= MOST_LINES_OF_MONITOR
 
 
 def test_each_public_name_is_defined_in_one_module() -> None:
