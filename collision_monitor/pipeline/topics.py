@@ -16,6 +16,10 @@ RULES: Final = "~/rules"
 RULES_IN_FORCE: Final = "~/rules_in_force"
 """Topic of a DiagnosticArray about the rules of the alerts, and whom each of them covers at this moment; latched."""
 
+SPEED_SCALE: Final = "~/speed_scale"
+"""Topic of a gate: how fast its plan goes on, from 0 to 1."""
+CHECK_TRAJECTORY: Final = "~/check_trajectory"
+"""Service of a gate."""
 GUARD_STATE: Final = "~/state"
 """Topic of a String on which the guard, a node of its own, explains what it does with the commands."""
 

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Final
 
 from collision_monitor.errors import InputError
-from collision_monitor.settings.regular_file import found_instead
+from collision_monitor.settings.regular_file import found_instead, read_regular
 from collision_monitor.settings.xml_tree import LARGEST_TEXT
 
 ENDING: Final = ".xacro"
@@ -61,7 +61,7 @@ def expand_xacro(path: Path, arguments: Mapping[str, str], packages: Mapping[str
         if process.returncode or not output.exists():
             reason = " ".join(said.split()) or f"exit code {process.returncode}"
             raise InputError(f"{path}: expected a file that xacro can read, got: {reason:.500}")
-        return output.read_bytes()
+        return read_regular(output, most=LARGEST_TEXT)
 
 
 def _program(path: Path) -> tuple[str, ...]:

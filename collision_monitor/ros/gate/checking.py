@@ -9,6 +9,7 @@ from typing import Any, Final
 
 from rclpy.node import Node
 
+from collision_monitor.pipeline.topics import CHECK_TRAJECTORY
 from collision_monitor.ros.endpoints import message_class
 from collision_monitor.ros.gate.gated_plan import GatedPlan
 from collision_monitor.ros.gate.gatekeeper import Gatekeeper
@@ -29,7 +30,7 @@ class CheckService:
         reading: Callable[[], ClockReading],
     ) -> None:  # fmt: skip
         self._keeper, self._made, self._reading = keeper, made, reading
-        self._service = node.create_service(_service_class(), "~/check_trajectory", self._answer)
+        self._service = node.create_service(_service_class(), CHECK_TRAJECTORY, self._answer)
 
     def _answer(self, request: Any, response: Any) -> Any:
         message = request.trajectory if len(request.trajectory.points) else request.path

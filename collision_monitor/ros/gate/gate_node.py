@@ -26,7 +26,7 @@ from trajectory_msgs.msg import JointTrajectory
 
 from collision_monitor import codec
 from collision_monitor.errors import CollisionMonitorError, InputError, MessageError
-from collision_monitor.pipeline.topics import GUARD_STATE, Topic
+from collision_monitor.pipeline.topics import GUARD_STATE, SPEED_SCALE, Topic
 from collision_monitor.robots.kinematic_tree import kinematic_tree
 from collision_monitor.robots.link_plans import load_link_plans
 from collision_monitor.robots.robot import Description
@@ -77,7 +77,7 @@ class GateNode(Node):
         self._report = GuardReport(self.get_logger(), self._keeper.world.robot, "gate")
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._state_out = self.create_publisher(String, GUARD_STATE, latched)
-        self._scale_out = self.create_publisher(Float64, "~/speed_scale", latched)
+        self._scale_out = self.create_publisher(Float64, SPEED_SCALE, latched)
         self._scale: float | None = None
         self._diagnostics = Diagnostics(self, self._report.reports, DiagnosticsParameters())
         for topic, callback in (
