@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import resource
 from pathlib import Path
 
@@ -149,7 +150,7 @@ def test_a_transition_that_fails_is_logged_with_its_cause_and_can_be_repeated(st
     assert not change(team, Transition.TRANSITION_CONFIGURE)
     resource.prlimit(monitor.pid, resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
     assert state(team) == "unconfigured"
-    assert "configure failed: MemoryError()" in monitor.words
+    assert re.search(r"configure failed: (MemoryError\(\)|ImportError\(.*failed to map)", monitor.words)
     assert "Remove the cause, then configure it again" in monitor.words
     assert change(team, Transition.TRANSITION_CONFIGURE)
     assert change(team, Transition.TRANSITION_ACTIVATE)
