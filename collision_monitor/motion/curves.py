@@ -15,8 +15,9 @@ CURVE_TOLERANCE: Final = 1e-6
 MOST_PIECES: Final = 1_000_000
 """Pieces of all curves of a trajectory, 150 MB. One that needs more has wider tubes."""
 
-MOST_PARTS: Final = 256
-"""Pieces of a curve between two points. A curve that needs more has a wider tube."""
+MOST_PARTS: Final = 64
+"""Pieces of a curve between two points: a metre from rest to rest in a second needs 46. A curve that needs more has a
+wider tube, by the third power of what it lacks. More: wild curves of a few points keep a step for 0.4 s."""
 
 PARABOLA_ERROR: Final = 1.0 / 124.0
 """Largest distance of a curve from the parabola through its ends and its middle, for third derivatives of at most 1 in

@@ -196,7 +196,8 @@ def plans(dice: Dice, now_ns: int) -> bytes:
             times = np.cumsum([dice.number(0.05, 0.5) for _ in range(points)]) - dice.number(0.0, 0.5)
         poses = [dice.pose(REACH) for _ in range(points - (dice.is_hostile and dice.chance(0.1)))]
         twists = [dice.numbers(6, -2.0, 2.0) for _ in range(points if dice.chance(0.4) else 0)]
-        between = dice.word(8) if dice.is_hostile else dice.random.randrange(3 if twists else 2)
+        # polite curves are short: each span of one between random poses has 64 pieces, see docs/limits.md
+        between = dice.word(8) if dice.is_hostile else dice.random.randrange(3 if twists and points < 3 else 2)
         bent = between == 2 or dice.is_hostile
         accelerations = [dice.numbers(6, -2.0, 2.0) for _ in range(points if bent and dice.chance(0.5) else 0)]
         for rows in (times, poses, twists, accelerations):
