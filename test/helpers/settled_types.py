@@ -51,9 +51,10 @@ def kind(value: Any) -> Any:
         return [value.dtype, value.ndim, layout, value.flags.aligned]
     if isinstance(value, tuple):
         key = tuple(map(id, value))  # a tuple of the same arrays, as most are, has the same kind
-        if _last.get(type(value), (None, None))[0] != key:
-            _last[type(value)] = key, (type(value), tuple(kind(each) for each in value))
-        return _last[type(value)][1]
+        known = _last.get(type(value))
+        if known is None or known[0] != key:  # another thread may replace it meanwhile
+            known = _last[type(value)] = key, (type(value), tuple(kind(each) for each in value))
+        return known[1]
     if isinstance(value, float):  # also float64 of NumPy
         return float
     if isinstance(value, int | np.integer) and not isinstance(value, bool):
