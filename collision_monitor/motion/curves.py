@@ -7,6 +7,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.geometry.runs import in_runs
+
 Array = NDArray[np.float64]
 
 CURVE_TOLERANCE: Final = 1e-6
@@ -73,8 +75,7 @@ def parabolas(h: Array, c: Array) -> Parabolas:
     parts = np.clip(np.ceil(np.cbrt(off / CURVE_TOLERANCE)), 1, MOST_PARTS).astype(int)
     if parts.sum() > MOST_PIECES:
         parts = np.maximum(parts * MOST_PIECES // parts.sum(), 1)
-    k = np.repeat(np.arange(len(parts)), parts)
-    nth = np.arange(len(k)) - np.repeat(np.cumsum(parts) - parts, parts)
+    k, nth = in_runs(parts)
     length = (h / parts)[k]
     age = nth * length
     s, d, (c0, c1, c2, c3, c4, c5) = age[:, None], length[:, None], np.moveaxis(c[k], 1, 0)

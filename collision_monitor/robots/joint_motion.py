@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor.errors import InputError
+from collision_monitor.geometry.runs import in_runs
 from collision_monitor.robots.kinematic_tree import KinematicTree
 
 Floats = NDArray[np.float64]
@@ -90,8 +91,7 @@ def joint_spans(motion: JointMotion, tree: KinematicTree, tolerance: float, base
 def _split(motion: JointMotion, parts: NDArray[np.int64], tree: KinematicTree) -> JointMotion:
     """Return the same motion with each span in some even parts (S,)."""
     _check_work(NODES * int(parts.sum()), tree)
-    of = np.repeat(np.arange(len(parts)), parts)
-    number = np.arange(len(of)) - np.repeat(np.cumsum(parts) - parts, parts)
+    of, number = in_runs(parts)
     later = (number * (np.diff(motion.edges) / parts)[of])[:, None]
     given = motion.coefficients[of]
     shifted = np.zeros_like(given)

@@ -21,6 +21,7 @@ from collision_monitor.geometry.coordinates import Array, Booleans, Indices, tri
 from collision_monitor.geometry.point_in_polygon import Location
 from collision_monitor.geometry.point_triangle import closest_point_on_triangle
 from collision_monitor.geometry.polyhedra import is_closed, locate_in_polyhedron
+from collision_monitor.geometry.runs import in_runs
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.tolerances import EPSILON, ROUNDED_UP
 
@@ -201,8 +202,7 @@ def _children(i: Indices, j: Indices, parent_a: Indices, parent_b: Indices) -> t
     first_a, count_a = _ranges(i, parent_a)
     first_b, count_b = _ranges(j, parent_b)
     total = count_a * count_b
-    pair = np.repeat(np.arange(len(i)), total)
-    rank = np.arange(len(pair)) - np.repeat(np.cumsum(total) - total, total)
+    pair, rank = in_runs(total)
     return first_a[pair] + rank // count_b[pair], first_b[pair] + rank % count_b[pair]
 
 

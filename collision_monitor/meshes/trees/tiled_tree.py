@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import device, kernel
+from collision_monitor.geometry.runs import in_runs
 from collision_monitor.geometry.vector import minus
 from collision_monitor.meshes.layout import (
     AXES,
@@ -127,21 +128,17 @@ def _plant(tree: Array, trees: Sequence[TileTree], first: NDArray[np.int64], til
         return
     sizes = np.array([len(each.blocks) - BOXES for each in own])
     start = first[tiles]
-    place = np.repeat(start, sizes) + _counted(sizes)
+    of, within = in_runs(sizes)
+    place = start[of] + within
     for each, at in zip(own, start.tolist(), strict=True):
         tree[at : at + len(each.blocks) - BOXES] = each.blocks[BOXES:]
     child = tree[place, CHILD]
-    tree[place, CHILD] = child + np.sign(child) * np.repeat(start - BOXES, sizes)[:, None]
+    tree[place, CHILD] = child + np.sign(child) * (start - BOXES)[of, None]
     boxes = np.stack([each.blocks[:BOXES, :, 0] for each in own])
     boxes[:, 0, CHILD] += np.sign(boxes[:, 0, CHILD]) * (start - BOXES)
     above = BOXES * (1 + tiles // WIDTH) if len(trees) > 1 else np.zeros(1, np.int64)
     for row in range(BOXES):
         tree[above + row, :, tiles % WIDTH] = boxes[:, row]
-
-
-def _counted(sizes: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Numbers from 0 on, anew for each of some lengths."""
-    return np.arange(sizes.sum()) - np.repeat(np.cumsum(sizes) - sizes, sizes)
 
 
 def _number_faces(tree: Array, trees: Sequence[TileTree], first: NDArray[np.int64], changed: list[int]) -> None:
@@ -152,12 +149,12 @@ def _number_faces(tree: Array, trees: Sequence[TileTree], first: NDArray[np.int6
     count = np.array([len(each.corners) for each in trees])
     leaves = (-(-count // WIDTH))[begin:]
     place = first[begin:] + np.array([len(each.blocks) for each in trees[begin:]]) - BOXES - leaves
-    within = _counted(leaves)
+    of, within = in_runs(leaves)
     last = (count[begin:] - 1) - WIDTH * (leaves - 1)
-    last = np.where(np.arange(leaves.sum()) == np.repeat(np.cumsum(leaves) - 1, leaves), np.repeat(last, leaves), WIDTH)
+    last = np.where(within == (leaves - 1)[of], last[of], WIDTH)
     lanes = np.minimum(np.arange(WIDTH), last[:, None])
-    base = np.repeat((np.cumsum(count) - count)[begin:], leaves) + WIDTH * within
-    tree[np.repeat(place, leaves) + within, FACE] = base[:, None] + lanes
+    base = (np.cumsum(count) - count)[begin:][of] + WIDTH * within
+    tree[place[of] + within, FACE] = base[:, None] + lanes
 
 
 def _state_facts(tree: Array, trees: Sequence[TileTree]) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from collision_monitor._jit import allocating_kernel, kernel
+from collision_monitor.geometry.runs import in_runs
 from collision_monitor.impact.body_contact import SHAPE_I, SHAPE_J, STATUS, TOUCHING, closing_now, relative_now
 from collision_monitor.impact.mesh_pair import has_mesh
 from collision_monitor.monitor.active_pairs import Active
@@ -178,8 +179,7 @@ def with_patches(
 def _repeated(contacts: NDArray[np.void], points: _Points) -> NDArray[np.void]:
     """Repeat each contact for each of its points, and set the points and closing speeds where there are several."""
     count = points.count
-    of = np.repeat(np.arange(len(contacts)), count)
-    index = np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count)
+    of, index = in_runs(count)
     rows = contacts.take(of)
     rows["point_index"], rows["point_count"] = index, count[of]
     some = np.flatnonzero(count[of] > 1)

@@ -7,6 +7,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from collision_monitor.geometry.runs import in_runs
 from collision_monitor.motion.stated_motion import LINEAR
 from collision_monitor.motion.trajectory import Trajectory
 from collision_monitor.sources.plans.speed_profile import SpeedLimits, profile_times
@@ -83,6 +84,5 @@ def _refined(ways: Floats, step: float) -> Floats:
     parts = np.ceil(spans / max(step, (ways[-1] - ways[0]) / MOST_STEPS)).astype(int)
     if parts.sum() < 2:
         parts[0] = 2
-    k = np.repeat(np.arange(len(parts)), parts)
-    nth = np.arange(len(k)) - np.repeat(np.cumsum(parts) - parts, parts)
+    k, nth = in_runs(parts)
     return np.append(ways[k] + nth * (spans / parts)[k], ways[-1])
