@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
+
 from collision_monitor.codec.cdr import Buffer, Reader, Writer, write_header
 
-_POINT = ("<f8", 3)
-_POSE = ("<f8", 7)
+_POINT, _POSE = np.dtype("V24"), np.dtype("V56")
+"""Elements that are copied as they are: three and seven numbers."""
 _DATA = b"uint8[] data"
 """The field of Shape, in a definition of ObjectDescriptionArray, that maps brought."""
 
@@ -52,8 +56,5 @@ def _copied_count(reader: Reader, writer: Writer, what: str) -> int:
     return count
 
 
-def _copy_sequence(reader: Reader, writer: Writer, dtype: object, alignment: int) -> None:
-    array = reader.sequence(dtype, alignment, "sequence")
-    writer.scalar("u4", len(array), "length")
-    if len(array):
-        writer.raw(array.tobytes(), alignment)
+def _copy_sequence(reader: Reader, writer: Writer, dtype: Any, alignment: int) -> None:
+    writer.sequence(reader.sequence(dtype, alignment, "sequence"), dtype, alignment)
