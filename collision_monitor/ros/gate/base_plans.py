@@ -12,11 +12,11 @@ from collision_monitor.motion.trajectory import Trajectory
 from collision_monitor.ros.gate.gated_plan import GatedPlan
 from collision_monitor.ros.gate.gated_world import GatedWorld
 from collision_monitor.shapes.pose import multiply, rotation_matrix
+from collision_monitor.sources.ground.scene_states import empty_states
+from collision_monitor.sources.messages.poses import put_pose
+from collision_monitor.sources.plans.path_source import MOST_PATH_POINTS
 
 Floats = NDArray[np.float64]
-
-MOST_PATH_POSES: Final = 20_000
-"""Poses of a path: 1 km at 5 cm."""
 
 SAME_PLACE: Final = 1e-4
 """m: nearer poses of a path are one."""
@@ -64,22 +64,12 @@ def base_plan(message: Any, world: GatedWorld, base: int, now_ns: int, speed: fl
 
 def _poses(message: Any) -> Floats:
     """Poses (N, 7) of a Path."""
-    if not 2 <= len(message.poses) <= MOST_PATH_POSES:
-        raise InputError(f"poses: expected 2 to {MOST_PATH_POSES}, got {len(message.poses)}")
-    found = np.array(
-        [
-            (
-                p.position.x,
-                p.position.y,
-                p.position.z,
-                p.orientation.x,
-                p.orientation.y,
-                p.orientation.z,
-                p.orientation.w,
-            )
-            for p in (each.pose for each in message.poses)
-        ]
-    )
+    if not 2 <= len(message.poses) <= MOST_PATH_POINTS:
+        raise InputError(f"poses: expected 2 to {MOST_PATH_POINTS}, got {len(message.poses)}")
+    rows = empty_states([0] * len(message.poses))
+    for k, each in enumerate(message.poses):
+        put_pose(rows[k : k + 1], each.pose)
+    found = np.concatenate([rows["position"], rows["quaternion"]], axis=1)
     if not np.isfinite(found).all():
         k = int(np.flatnonzero(~np.isfinite(found).all(axis=1))[0])
         raise InputError(f"poses: expected finite numbers, got others at pose {k}")

@@ -25,7 +25,7 @@ TIMES: Final = 81
 """Times of the plan among which the one is searched at which the robot is."""
 
 AS_NEAR: Final = 2e-3
-"""m: places of the plan that are as near to the robot as the nearest, of which the expected time decides."""
+"""m: places of the plan this much farther from the robot than the nearest are as near; the expected time decides."""
 
 
 @dataclass(frozen=True)
@@ -51,13 +51,13 @@ class Execution:
     # -- where it is
 
     def commanded(self, now_ns: int) -> float:
-        """Time of the plan (s) at which the controller is told to be."""
+        """Commanded time of the plan (s)."""
         if not self.timed:
             return self.progress.time
         return float(np.clip(self.change.plan_time(self._since(now_ns)), 0.0, self.plan.end)[0])
 
     def rate(self, now_ns: int) -> float:
-        """Rate that the controller is told to have."""
+        """Commanded rate."""
         return float(self.change.rate_at(self._since(now_ns))[0])
 
     def _since(self, now_ns: int) -> Floats:
