@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 import collision_monitor as cm
 from collision_monitor.accuracy.calibration.deviation import LAGS, Growth, growth_of
+from collision_monitor.accuracy.calibration.tracks import estimated_states
 from collision_monitor.narrow_phase.dispatch import contact_batch
 from collision_monitor.records import StateFlag
 from collision_monitor.settings.profile import Profile
@@ -98,13 +99,7 @@ def estimated(frames: list[NDArray[np.void]], ids: list[int]) -> list[NDArray[np
     found = []
     for frame, states in enumerate(frames):
         chosen = np.isin(states["id"], ids)
-        own = np.array([slots[i] for i in states["id"][chosen].tolist()], np.int64)
-        unknown = states[chosen]
-        for slot in own[(unknown["flags"] & StateFlag.DISCONTINUITY) != 0].tolist():
-            estimator.forget(slot)
-        unknown["flags"] |= np.uint32(StateFlag.TWIST_UNKNOWN)
-        estimator.completed(unknown, own, round(frame / FRAME_RATE * 1e9), WINDOW)
-        estimator.write(unknown, own, everywhere=True)
+        unknown = estimated_states(states[chosen], slots, round(frame / FRAME_RATE * 1e9), WINDOW, estimator)
         first = (unknown["flags"] & StateFlag.TWIST_UNKNOWN) != 0
         unknown[first] = states[chosen][first]
         unknown["velocity_stddev"] = unknown["angular_velocity_stddev"] = 0.0

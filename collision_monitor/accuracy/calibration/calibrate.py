@@ -86,7 +86,7 @@ def calibrate(
 ) -> tuple[list[Calibration], list[str]]:
     """Return what the tracks of each class say, and one sentence for each class that says nothing.
 
-    note: is told how many classes are done.
+    note: called with 1 after each class.
     """
     found, left_out = [], []
     for name, tracks in classes.items():

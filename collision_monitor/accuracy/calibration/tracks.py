@@ -47,8 +47,8 @@ def tracks_by_class(works: Iterable[Workload], patterns: Sequence[str] = ()) -> 
     found: dict[str, list[Track]] = defaultdict(list)
     for work in works:
         names = {each.object_id: each.name or f"object {each.object_id}" for each in work.descriptions}
-        for name, track in _tracks(work, names):
-            word = class_of(name, patterns)
+        for track in _tracks(work, names):
+            word = class_of(track.name, patterns)
             if word is not None:
                 found[word].append(track)
     return dict(sorted(found.items()))
@@ -61,7 +61,7 @@ def class_of(name: str, patterns: Sequence[str]) -> str | None:
     return _NUMBER.sub("", name.rsplit("/", 1)[-1]) or name
 
 
-def _tracks(work: Workload, names: Mapping[int, str]) -> list[tuple[str, Track]]:
+def _tracks(work: Workload, names: Mapping[int, str]) -> list[Track]:
     slots = {object_id: k for k, object_id in enumerate(names)}
     estimators = {window: TwistEstimator() for window in WINDOWS}
     for each in estimators.values():
@@ -75,7 +75,8 @@ def _tracks(work: Workload, names: Mapping[int, str]) -> list[tuple[str, Track]]
             continue
         last = stamp_ns
         stamps += [stamp_ns] * len(states)
-        rows.append(np.stack([states, *_estimated(states, slots, stamp_ns, estimators)]))
+        others = (estimated_states(states, slots, stamp_ns, window, each) for window, each in estimators.items())
+        rows.append(np.stack([states, *others]))
     if not rows:
         return []
     table, time = np.concatenate(rows, axis=1), np.array(stamps)
@@ -86,23 +87,22 @@ def _tracks(work: Workload, names: Mapping[int, str]) -> list[tuple[str, Track]]
         for part in np.split(own, jumps[jumps > 0]):
             seconds = (time[part] - time[0]) * 1e-9
             windows = {window: table[1 + k, part] for k, window in enumerate(WINDOWS)}
-            found.append((names[object_id], Track(names[object_id], seconds, table[0, part], windows)))
+            found.append(Track(names[object_id], seconds, table[0, part], windows))
     return found
 
 
-def _estimated(
-    states: States, slots: Mapping[int, int], stamp_ns: int, estimators: Mapping[float, TwistEstimator]
-) -> list[States]:
-    """The states with twists from their positions, for each window; those that have none yet stay TWIST_UNKNOWN."""
+def estimated_states(
+    states: States, slots: Mapping[int, int], stamp_ns: int, window: float, estimator: TwistEstimator
+) -> States:  # fmt: skip
+    """The states with twists from their positions over a window (s); those that have none yet stay TWIST_UNKNOWN.
+
+    slots: of the estimator, by id. It gets the states of each stamp once, in order.
+    """
     own = np.array([slots[i] for i in states["id"].tolist()], np.int64)
     for slot in own[(states["flags"] & _JUMPS) != 0].tolist():
-        for each in estimators.values():
-            each.forget(slot)
-    found = []
-    for window, each in estimators.items():
-        unknown = states.copy()
-        unknown["flags"] = (unknown["flags"] | _UNKNOWN) & ~_BODY
-        each.completed(unknown, own, stamp_ns, window)
-        each.write(unknown, own, everywhere=True)
-        found.append(unknown)
-    return found
+        estimator.forget(slot)
+    unknown = states.copy()
+    unknown["flags"] = (unknown["flags"] | _UNKNOWN) & ~_BODY
+    estimator.completed(unknown, own, stamp_ns, window)
+    estimator.write(unknown, own, everywhere=True)
+    return unknown
