@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import resource
 from pathlib import Path
 
@@ -143,14 +142,14 @@ def memory_of(pid: int) -> int:
 
 
 def test_a_transition_that_fails_is_logged_with_its_cause_and_can_be_repeated(start, team):
-    """The recorder needs 24 MiB at its start, which the node may not allocate at first."""
+    """The recorder needs 24 MiB at its start, which the node may not allocate at first; its libraries need less."""
     monitor = start("run", "--record", "run.mcap", *MANAGED)
     assert state(team) == "unconfigured"
-    resource.prlimit(monitor.pid, resource.RLIMIT_AS, (memory_of(monitor.pid) + (12 << 20), resource.RLIM_INFINITY))
+    resource.prlimit(monitor.pid, resource.RLIMIT_AS, (memory_of(monitor.pid) + (20 << 20), resource.RLIM_INFINITY))
     assert not change(team, Transition.TRANSITION_CONFIGURE)
     resource.prlimit(monitor.pid, resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
     assert state(team) == "unconfigured"
-    assert re.search(r"configure failed: (MemoryError\(\)|ImportError\(.*failed to map)", monitor.words)
+    assert "configure failed: MemoryError()" in monitor.words
     assert "Remove the cause, then configure it again" in monitor.words
     assert change(team, Transition.TRANSITION_CONFIGURE)
     assert change(team, Transition.TRANSITION_ACTIVATE)
