@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from fed import Fed
-from foreign_bag import START
+from foreign_bag import START, odometry, transforms
 from foreign_messages import grid_map
 
 from collision_monitor.objects.description import ObjectDescription
@@ -44,6 +44,17 @@ def test_unknown_heights_are_unresolved_by_default() -> None:
     ((field, _),) = fed.changes[0].shapes  # type: ignore[union-attr]
     assert np.isnan(field.heights).sum() == 2
     assert [solid.unsure for solid in field.solids] == [False, True]
+
+
+def test_a_terrain_that_comes_before_its_frame_waits_for_it() -> None:
+    fed = Fed({**MAP, "cart": {"topic": "/odom", "shape": {"sphere": 1.0}}})
+    fed.give("/elevation", START, grid_map("floor", START, {"elevation": np.ones((4, 4))}, 0.5, (0, 0, 0)))
+    before = [change.object_id for change in fed.changes]
+    fed.give("/tf_static", START + 1, transforms(START + 1, ("map", "floor", (5, 0, 1), (0, 0, 0, 1))))
+    fed.give("/odom", START + 2, odometry("map", START + 2, (0, 0, 0), (0, 0, 0, 1), (1, 0, 0), (0, 0, 0)))
+    (terrain,) = [each for each in fed.changes if isinstance(each, ObjectDescription) and each.name == "ground"]
+    assert terrain.object_id not in before and terrain.pose is not None
+    np.testing.assert_allclose(terrain.pose.position, (5 - 0.75, -0.75, 1))  # the centre of the last cell
 
 
 def _set_layout(message: Any) -> None:

@@ -15,11 +15,11 @@ from collision_monitor.errors import InputError
 from collision_monitor.shapes.kinds.height_field import MOST_HEIGHTS
 from collision_monitor.shapes.pose import Pose
 from collision_monitor.shapes.registry import HeightField
-from collision_monitor.sources.ground.frames import frame_name
+from collision_monitor.sources.ground.frames import FrameMotion
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
-from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
+from collision_monitor.sources.messages.map_source import MapSource, map_pose
 
 GRID_MAP: Final = "grid_map_msgs/msg/GridMap"
 
@@ -27,26 +27,21 @@ COLUMN, ROW = "column_index", "row_index"
 """Labels of the dimensions of a layer."""
 
 
-class GridMapSource(Source):
+class GridMapSource(MapSource):
     """The terrain of one entry: heights of its `layer` at the centres of the cells, and the ground 1 m below them."""
+
+    speaks = True
 
     def __init__(self, entry: ObjectEntry, message_type: str, mapping: Mapping) -> None:
         entry.allow_only(("layer", "unknown"), message_type)
         if entry.shapes:
             raise InputError(f"{entry.name}, shape: {message_type} brings its own heights")
-        self.name, self.topics = entry.name, {entry.topic: (message_type,)}
-        self._entry = entry
+        super().__init__(entry, {entry.topic: (message_type,)})
 
-    def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
-        """See Source."""
-        entry = self._entry
-        frame = scene.locate(entry.name, frame_name(content.header.frame_id), stamp_ns)
-        if frame is None:
-            return
-        heights = _heights(content, entry.layer)
-        about = content.info
-        p, q = about.pose.position, about.pose.orientation
-        place = Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w) if any((q.x, q.y, q.z, q.w)) else (0.0, 0.0, 0.0, 1.0))
+    def take_map(self, content: Any, frame: FrameMotion, scene: SourceScene) -> None:
+        """See MapSource."""
+        entry, about = self._entry, content.info
+        heights, place = _heights(content, entry.layer), map_pose(about.pose)
         rows, columns = heights.shape
         resolution = float(about.resolution)
         field = HeightField(heights, resolution, unknown=entry.unknown)

@@ -14,8 +14,8 @@ from collision_monitor.shapes.registry import Grid
 from collision_monitor.sources.ground.frames import FrameMotion, frame_name
 from collision_monitor.sources.ground.mapping import Mapping
 from collision_monitor.sources.ground.object_entry import ObjectEntry
-from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import SourceScene
+from collision_monitor.sources.messages.map_source import MapSource, map_pose
 from collision_monitor.tolerances import LARGEST_INPUT
 
 GRID: Final = "nav_msgs/msg/OccupancyGrid"
@@ -46,54 +46,39 @@ class CellWindow(NamedTuple):
     cells: Cells
 
 
-class GridSource(Source):
+class GridSource(MapSource):
     """The map of one entry: its occupied cells as one object; its unknown ones as another one, whose contacts are
     UNRESOLVED, unless `unknown` says that they are obstacles or free.
 
     Two objects, because what is certain of the one is certain also where it is not known of the other.
     """
 
-    speaks = False
-
     def __init__(self, entry: ObjectEntry, message_type: str, mapping: Mapping) -> None:
         entry.allow_only(("height", "threshold", "unknown", "updates"), message_type)
         if entry.shapes:
             raise InputError(f"{entry.name}, shape: {message_type} brings its own cells; `height` is theirs")
-        self.name, self.topics = entry.name, {entry.topic: (message_type,)}
-        if entry.updates:
-            self.topics[entry.updates] = (UPDATES[message_type],)
-        self._entry, self._is_cost = entry, message_type == COSTMAP
+        updates = {entry.updates: (UPDATES[message_type],)} if entry.updates else {}
+        super().__init__(entry, {entry.topic: (message_type,), **updates})
+        self._is_cost = message_type == COSTMAP
         self._least = entry.threshold or (LETHAL if self._is_cost else OCCUPIED_FROM)
         self._cells: Cells | None = None
         self._place = 0.0, Pose()  # resolution (m), and the pose of the grid in its frame
         self._frame = ""
         self._grids: dict[int, Grid | None] = {}  # by what cells are
         self._unknown_id: int | None = None
-        self._waiting: Any = None  # a map whose frame is not known yet
 
     def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
-        """See Source. A grid describes the objects; an update replaces some cells."""
+        """See Source. An update replaces some cells."""
+        if topic == self._entry.topic:
+            super().take(topic, content, stamp_ns, scene)
+            return
         name = frame_name(content.header.frame_id)
-        is_whole = topic == self._entry.topic
-        frame = scene.locate(self._entry.name, name, stamp_ns)
-        self._waiting = content if is_whole and frame is None else None if is_whole else self._waiting
-        if frame is not None and is_whole:
-            self._take_whole(content, frame, scene)
-        elif frame is not None:
+        frame = scene.locate(self.name, name, stamp_ns)
+        if frame is not None:
             self._describe(frame, self._part(content, name), scene)
 
-    def settle(self, now_ns: int, scene: SourceScene) -> None:
-        """See Source. A map comes once, maybe before the transforms that say where it is."""
-        content = self._waiting
-        if content is None:
-            return
-        frame = scene.frames.motion(scene.frame, frame_name(content.header.frame_id), now_ns)
-        if isinstance(frame, FrameMotion):
-            self._waiting = None
-            with scene.guard(self._entry.name):
-                self._take_whole(content, frame, scene)
-
-    def _take_whole(self, content: Any, frame: FrameMotion, scene: SourceScene) -> None:
+    def take_map(self, content: Any, frame: FrameMotion, scene: SourceScene) -> None:
+        """See MapSource."""
         self._cells, self._place = self._whole(content)
         self._frame, self._grids = frame_name(content.header.frame_id), {}
         self._describe(frame, None, scene)
@@ -107,8 +92,7 @@ class GridSource(Source):
             raise InputError(
                 f"resolution: expected a positive number of metres, got {resolution:g}; what was there stays"
             )
-        p, q = about.origin.position, about.origin.orientation
-        place = Pose((p.x, p.y, p.z), (q.x, q.y, q.z, q.w) if any((q.x, q.y, q.z, q.w)) else (0.0, 0.0, 0.0, 1.0))
+        place = map_pose(about.origin)
         return self._values(content.data, *map(int, size)).copy(), (resolution, place)
 
     def _part(self, content: Any, frame: str) -> CellWindow:
