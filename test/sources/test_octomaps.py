@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import math
+import os
 import struct
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -147,3 +151,25 @@ def test_random_bytes_are_an_octree_or_refused() -> None:
         data = rng.integers(0, 256, rng.integers(0, 400), np.uint8).tobytes()
         fed.give("/octomap", START, octomap("map", START, data, binary=bool(k % 2), id="OcTree"))
         assert bool(fed.changes) + bool(fed.refused) <= 1
+
+
+LOADED = """
+from fed import Fed
+from collision_monitor.sources.messages.octomap_leaves import _read_binary, _read_full
+fed = Fed({"map": {"topic": "/map"}})
+for problem in fed.feed.bind("/map", "%s").values():
+    raise SystemExit(problem)
+print([len(each.overloads) for each in (_read_binary, _read_full)])
+"""
+
+
+@pytest.mark.parametrize("message", ["octomap_msgs/msg/Octomap", "moveit_msgs/msg/PlanningScene"])
+def test_the_readers_are_loaded_before_a_message_arrives(message: str) -> None:
+    """Else the first octomap of a scene held a new machine for as long as they take to compile."""
+    done = subprocess.run(
+        [sys.executable, "-c", LOADED % message],
+        cwd=Path(__file__).parents[1] / "helpers",
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])},
+        capture_output=True, text=True, timeout=300.0,
+    )  # fmt: skip
+    assert done.stdout.strip() == "[1, 1]", done.stderr[-1500:]

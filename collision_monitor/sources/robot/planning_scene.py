@@ -19,7 +19,7 @@ from collision_monitor.sources.ground.mapping import Mapping as SourcesFile
 from collision_monitor.sources.ground.object_entry import ObjectEntry
 from collision_monitor.sources.ground.source import Source
 from collision_monitor.sources.ground.source_scene import LONGEST_TEXT, SourceScene
-from collision_monitor.sources.messages.octomap_leaves import octomap_voxels
+from collision_monitor.sources.messages.octomap_leaves import load_octree_readers, octomap_voxels
 from collision_monitor.sources.messages.octomaps import OCCUPIED
 from collision_monitor.sources.robot.carried_bodies import Body
 from collision_monitor.sources.robot.collision_objects import (
@@ -105,6 +105,7 @@ class PlanningSceneSource(Source):
         self._unusable: set[str] = set()  # objects that are listed because their messages were refused
         self._is_changed = False
         self._waits = False  # whether an object is not placed yet
+        load_octree_readers()
 
     def take(self, topic: str, content: Any, stamp_ns: int, scene: SourceScene) -> None:
         """See Source."""
